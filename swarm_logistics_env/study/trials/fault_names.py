@@ -9,9 +9,8 @@ from shlex import quote
 
 from .complaints import Complaints
 from .table import Cells, Columns
-from .trial import NO_FAULT_WORD, REMOVED_WORD, REPEATED
-from .trial_columns import bare
-from .words import MEANING, NO_FAULT_WORDS, NOT_KNOWN, REMOVED_WORDS, is_translated, plain
+from .trial import NO_FAULT_WORD, REPEATED
+from .words import MEANING, NOT_KNOWN, is_translated, plain
 
 ZERO = ("0", "0.0")  # of robots that fail, by a row's word
 
@@ -19,12 +18,16 @@ ZERO = ("0", "0.0")  # of robots that fail, by a row's word
 class FaultNames:
     """What the faults of a file are called in the study.
 
+    Args:
+        mapped: what a column is to its name in the file, as somebody says.
+        complaints: take a row that names no fault where others do.
+
     Attributes:
         notes: sentences on what was taken for what.
     """
 
-    def __init__(self, columns: Columns, complaints: Complaints) -> None:
-        self.notes: list[str] = []
+    def __init__(self, columns: Columns, mapped: Mapping[str, str], complaints: Complaints) -> None:
+        self.notes = [*_notes_on_words(columns, mapped)]
         self._names = {"": NO_FAULT_WORD}
         fault = columns.by_meaning.get("fault")
         if fault is None:
@@ -38,7 +41,7 @@ class FaultNames:
         harmful = {name.casefold() for name, n in zip(fault.texts, robots) if n not in ZERO}
         harmless = spelled.keys() - harmful if harmful else set[str]()
         for name in faults:
-            self._names[name] = usual_fault(name) or spelled[name.casefold()]
+            self._names[name] = fault.usual_faults[name] or spelled[name.casefold()]
             if name.casefold() in NOT_KNOWN:
                 with complaints.noted():
                     _refuse_unnamed(fault, name, complaints)
@@ -67,31 +70,24 @@ class FaultNames:
         return any(name not in (NO_FAULT_WORD, REPEATED) for name in self._names.values())
 
 
-def usual_fault(name: str) -> str | None:
-    """Return what a fault is called by a word that is known in any language; None: it is not."""
-    word = plain(name)
-    if word in NO_FAULT_WORDS or name == "-":
-        return NO_FAULT_WORD
-    if word in REMOVED_WORDS:
-        return REMOVED_WORD
-    return REPEATED if word in (REPEATED, "none again") else None
-
-
-def notes_on_words(columns: Columns, mapped: Mapping[str, str]) -> Iterator[str]:
+def _notes_on_words(columns: Columns, mapped: Mapping[str, str]) -> Iterator[str]:
     """Yield which words of other languages were recognised.
 
     Args:
         mapped: what a column is to its name in the file, as somebody says.
     """
-    words = {}
+    words = dict[str, str]()
     for meaning, cells in columns.by_meaning.items():
-        word = bare(cells.name)
+        word = cells.name.bare
         if cells.name not in mapped.values() and word in MEANING and is_translated(word):
             words[cells.name] = "robots" if meaning == "n_robots" else meaning
     fault = columns.by_meaning.get("fault")
-    for name in dict.fromkeys(fault.texts if fault else ()):
-        if (usual := usual_fault(name)) and name != "-" and is_translated(plain(name)):
-            words[name] = usual
+    if fault:
+        words |= {
+            name: usual
+            for name, usual in fault.usual_faults.items()
+            if usual and name != "-" and is_translated(plain(name))
+        }
     if words:
         pairs = ", ".join(f"{word!r} for {usual}" for word, usual in words.items())
         yield f"Words taken for ours: {pairs}."

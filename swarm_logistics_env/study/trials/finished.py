@@ -8,14 +8,10 @@ from __future__ import annotations
 
 from shlex import quote
 
-from swarm_logistics_env.spi.inputs import IndicatorError
-
 from .complaints import Complaints
 from .table import CellError, Columns
-from .trial_columns import bare
-from .words import NO_WORDS, YES_WORDS, plain
+from .words import plain, says_yes
 
-_FEWEST_AT_A_LIMIT = 3  # trials that last as long, and the longest, by no chance
 _CROSS = "x"  # marks yes, unless another word of the column does
 
 
@@ -56,37 +52,11 @@ def finished_words(columns: Columns, complaints: Complaints) -> dict[str, bool]:
     return meanings
 
 
-def refuse_time_limit(columns: Columns, duration: float | None) -> None:
-    """Ask whether trials that lasted the longest, all as long, were stopped then.
-
-    Args:
-        duration: of every trial [s], as somebody says.
-
-    Raises:
-        IndicatorError: nothing says it.
-    """
-    cells = columns.by_meaning.get("time_to_finish")
-    is_said = duration is not None or {"finished", "performance"} & columns.by_meaning.keys()
-    if cells is None or is_said or not cells.are_like_numbers():
-        return
-    times = [cells.number(row) for row, text in enumerate(cells.texts) if text]
-    longest = max(times, default=0.0)
-    n_longest = times.count(longest)
-    if n_longest >= _FEWEST_AT_A_LIMIT:
-        lasted = columns.by_meaning.get("duration")
-        ignored = f" --ignore {quote(lasted.name)}" if lasted else ""
-        raise IndicatorError(
-            f"{cells.table.source}: {n_longest} of {len(times)} trials have the longest "
-            f"{cells.name!r}, {longest:.15g}, as if they had been stopped then: --duration "
-            f"{longest:.15g}{ignored} says so; where they finished, --duration with a longer time"
-        )
-
-
 def _refuse_unnamed(columns: Columns) -> None:
     """Ask of a column that may say which trials finished, and would be a parameter."""
     for cells in (*columns.parameters, *columns.covariates):
         words = {*cells.texts}
-        means = says_yes(bare(cells.name))
+        means = says_yes(cells.name.bare)
         is_number = all(word.replace(".", "").isdigit() for word in words)
         if {says_yes(word) for word in words} != {True, False} or (is_number and means is None):
             continue
@@ -101,11 +71,3 @@ def _refuse_unnamed(columns: Columns) -> None:
             f"{quote(cells.name)}"
         )
         raise CellError(message, cells.name, 0)
-
-
-def says_yes(cell: str) -> bool | None:
-    """Return what a word says; None: it is neither for yes nor for no."""
-    word = plain(cell)
-    if word in YES_WORDS:
-        return True
-    return False if word in NO_WORDS else None

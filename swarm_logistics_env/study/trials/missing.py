@@ -8,8 +8,8 @@ from dataclasses import replace
 from swarm_logistics_env.spi.inputs import IndicatorError
 
 from .complaints import Complaints
-from .fault_names import ZERO, usual_fault
-from .table import Cells, Columns, Table, are_numbers
+from .fault_names import ZERO
+from .table import Cells, Columns, Table
 from .trial import NO_FAULT_WORD
 from .words import NOT_KNOWN, means_no_number
 
@@ -31,12 +31,12 @@ def missing_rows(columns: Columns) -> dict[str, list[int]]:
     for meaning, cells in meanings.items():
         if meaning in _NAMES:
             rows[cells.name] = _empty_among_others(cells)
-        elif meaning in needed and are_numbers(cells.texts):
+        elif meaning in needed and cells.are_numbers:
             rows[cells.name] = _without_number(cells)
         elif meaning in _MAY_BE_EMPTY:
             rows[cells.name] = [row for row in _without_number(cells) if cells.texts[row]]
     for cells in (*columns.parameters, *columns.blocks):
-        if are_numbers(cells.texts):
+        if cells.are_numbers:
             rows[cells.name] = _without_number(cells)
         elif cells in columns.blocks:
             rows[cells.name] = _empty_among_others(cells)
@@ -92,6 +92,6 @@ def _add_of_faults(fault: Cells, faulty: Cells | None, rows: dict[str, list[int]
 
 def _uncounted(fault: Cells, numbers: Sequence[str]) -> Iterator[int]:
     for row, (text, number) in enumerate(zip(fault.texts, numbers)):
-        is_fault = text.casefold() not in NOT_KNOWN and usual_fault(text) != NO_FAULT_WORD
+        is_fault = text.casefold() not in NOT_KNOWN and fault.usual_faults[text] != NO_FAULT_WORD
         if is_fault and means_no_number(number):
             yield row

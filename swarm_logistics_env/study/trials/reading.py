@@ -7,15 +7,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .cell_checks import check_cells
+from .column_checks import check_columns
 from .complaints import Complaints
-from .fault_names import FaultNames, notes_on_words
+from .fault_names import FaultNames
 from .finished import finished_words
 from .missing import missing_rows, without_rows
 from .pairing import paired_by_blocks
 from .readers import read_table
 from .references import notes_on_references, references_of
 from .table import Cells, Columns, Table
-from .table_checks import check_cells, check_columns
 from .trial import Column, Trial, Trials
 from .trial_columns import columns_of
 from .trial_rows import numbered_blocks, trials_of
@@ -79,7 +80,7 @@ def read_trials(
     )
     finished = finished_words(table_columns, complaints)
     check_cells(table_columns, complaints, is_summed=sum_over is not None)
-    faults = FaultNames(table_columns, complaints)
+    faults = FaultNames(table_columns, mapped, complaints)
     check_columns(table_columns, faults, mapped, duration, complaints)
     complaints.raise_all()
     blocks = numbered_blocks(table_columns)
@@ -89,7 +90,6 @@ def read_trials(
     notes = [
         *table_columns.table.notes,
         *table_columns.notes,
-        *notes_on_words(table_columns, mapped),
         *faults.notes,
         *_notes_on_conditions(trials, table_columns),
         *_notes_on_left_out(table_columns.ignored, conditions),
@@ -164,7 +164,7 @@ def _notes_on_left_out(columns: Sequence[Cells], conditions: Sequence[object]) -
 
 def _uses_of(columns: Columns) -> tuple[Column, ...]:
     """Return what every column of a table was taken for."""
-    use_by_name = {cells.name: "parameter" for cells in columns.parameters}
+    use_by_name: dict[str, str] = {cells.name: "parameter" for cells in columns.parameters}
     use_by_name |= {cells.name: "covariate" for cells in columns.covariates}
     use_by_name |= {cells.name: meaning for meaning, cells in columns.by_meaning.items()}
     use_by_name |= {cells.name: "seed" for cells in columns.blocks}

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
-from .words import means_no_number
+from .column_name import ColumnName
+from .words import means_no_number, usual_fault
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _LIKE_A_NUMBER = re.compile(r"[+-]?\d*[.,]?\d*([eE][+-]?\d+)?")  # also a decimal comma, or nothing
@@ -94,10 +95,15 @@ class Table:
     @cached_property
     def columns(self) -> dict[str, Cells]:
         """The cells of each column, by its name."""
-        return {
-            name: Cells(name, [row[number] for row in self.cells], self)
-            for name, number in self.index.items()
-        }
+        return {cells.name: cells for cells in self.columns_in_order}
+
+    @cached_property
+    def columns_in_order(self) -> list[Cells]:
+        """The cells of each column; several may have one name."""
+        return [
+            Cells(ColumnName(name), [row[number] for row in self.cells], self)
+            for number, name in enumerate(self.header)
+        ]
 
     def location(self, row: int) -> str:
         """Return file and line of a row."""
@@ -118,7 +124,7 @@ class Cells:
         seconds: that the unit of a time has; 1 where it is not converted.
     """
 
-    name: str
+    name: ColumnName
     texts: Sequence[str]
     table: Table
     meaning: str = ""
@@ -130,9 +136,26 @@ class Cells:
         message = f"{self.table.location(row)}, column {self.name!r}: {shown}: {should}"
         return CellError(message, self.name, row)
 
+    @cached_property
     def are_like_numbers(self) -> bool:
-        """Return whether each cell is meant as a number, or empty."""
+        """Whether each cell is meant as a number, or empty."""
         return all(map(like_a_number, self.texts))
+
+    @cached_property
+    def are_numbers(self) -> bool:
+        """Whether all cells with a value are meant as numbers, and there is one."""
+        return are_numbers(self.texts)
+
+    @cached_property
+    def are_mostly_numbers(self) -> bool:
+        """Whether most cells with a value are meant as numbers."""
+        values = [text for text in self.texts if not means_no_number(text)]
+        return 2 * sum(map(like_a_number, values)) > len(values)
+
+    @cached_property
+    def usual_faults(self) -> dict[str, str | None]:
+        """What each cell is as a fault, see `usual_fault`."""
+        return {text: usual_fault(text) for text in dict.fromkeys(self.texts)}
 
     def number(self, row: int, least: float = -math.inf, *, must_be_whole: bool = False) -> float:
         """Return the cell of a row as a finite number of at least `least`; a time in seconds."""
@@ -228,12 +251,6 @@ def are_numbers(texts: Sequence[str]) -> bool:
     """Return whether all cells with a value are meant as numbers, and there is one."""
     values = [text for text in texts if not means_no_number(text)]
     return bool(values) and all(map(like_a_number, values))
-
-
-def holds_numbers(texts: Sequence[str]) -> bool:
-    """Return whether most cells with a value are meant as numbers."""
-    values = [text for text in texts if not means_no_number(text)]
-    return 2 * sum(map(like_a_number, values)) > len(values)
 
 
 @lru_cache(100_000)  # most cells are some of a few numbers

@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from shlex import quote
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
+from .column_name import ColumnName
 from .complaints import Complaints
+from .signs import with_signs
 from .table import Cells, Columns, Table
-from .units import SECONDS, NamedUnit, in_seconds, is_per_minute, unit_of_time, without_unit
-from .words import CELLS, COLUMN_NAMES, ENGLISH_NAMES, MEANING, means_no_number, plain
+from .units import SECONDS, NamedUnit, in_seconds, units_of_times
+from .words import CELLS, COLUMN_NAMES, ENGLISH_NAMES, MEANING
 
 TEXTS = ("fault", "policy", "trial", "table", "finished")  # columns that hold no numbers
-TIMES = ("onset", "time", "time_to_finish", "duration")
 SEEDS = ("seed", "pair")  # blocks of one run each in every condition
 # A column is a covariate, no parameter, that has so many values at least, and more values than half
 # of the trials or than any plan has levels.
 FEWEST_OF_COVARIATE = 6
 MOST_LEVELS = 50
-_ROBOT = re.compile(r"(robot|agent|drone|bot)(_?(id|no|nr|num|number|name|index|label))?|id_robot")
-# With a sign between thousands and the other one before decimals.
-_BOTH_SIGNS = re.compile(r"[+-]?\d{1,3}((\.\d{3})+,\d+|(,\d{3})+\.\d+)")
-# How a decimal comma looks that can stand between no thousands.
-_DECIMAL_COMMA = re.compile(r"[+-]?(\d+,(\d{1,2}|\d{4,})|0,\d+|\d{4,},\d+)")
 ONE_TRIAL_A_ROW = (
     "the unit is the trial, never the robot; sum the deliveries of a trial's robots into one row"
 )
@@ -51,19 +46,17 @@ def columns_of(
             has no unit that its times can have; rows of robots, not of trials.
 
     Raises:
-        IndicatorError: a column that somebody names is not there, or there are no rows.
+        IndicatorError: a column that somebody names is not there, there are no rows, or a sign
+            cannot be one.
     """
-    for option, sign in (("--decimal", decimal), ("--thousands", thousands)):
-        if sign not in (None, ".", ","):
-            raise IndicatorError(f"{option} {sign}: should be . or ,")
-    if decimal is not None and decimal == thousands:
-        raise IndicatorError(f"--thousands {thousands}: should be another sign than --decimal")
-    names, parameters, blocks = _names(table, columns, ignore, complaints)
+    names, parameters, blocks, errors = _names(table, columns, ignore, complaints.suspected)
+    for error in errors:
+        complaints.add(error)
     numbers = [*(name for column, name in names.items() if column not in TEXTS), *parameters]
-    table, notes = _with_signs(table, numbers, decimal, thousands, complaints)
+    table, notes = with_signs(table, numbers, decimal, thousands, complaints)
     units = dict[str, NamedUnit]()
     with complaints.noted():
-        units = _units_of_times(table, names)
+        units = units_of_times(table.source, names)
     seconds = {column: SECONDS[unit.unit] for column, unit in units.items() if unit.unit in SECONDS}
     notes += [
         f"{names[column]!r} is converted to seconds."
@@ -78,7 +71,7 @@ def columns_of(
     block_cells = [table.columns[name] for name in blocks]
     if len(blocks) > 1:
         texts = [", ".join(row) for row in zip(*(cells.texts for cells in block_cells))]
-        by_meaning["seed"] = Cells(names["seed"], texts, table, "seed")
+        by_meaning["seed"] = Cells(ColumnName(names["seed"]), texts, table, "seed")
     varying, covariates = _parameters(table, parameters, is_log="time" in names)
     # What somebody calls a block counts before its name in the file.
     words = {name: word for word, name in columns.items() if MEANING[word] == "seed"}
@@ -89,8 +82,8 @@ def columns_of(
         covariates=covariates,
         ignored=[table.columns[name] for name in dict.fromkeys(ignore)],
         blocks=block_cells,
-        seeds=[name for name in blocks if bare(name) in SEEDS],
-        has_seeds=any(bare(words.get(name, name)) in SEEDS for name in blocks),
+        seeds=[cells.name for cells in block_cells if cells.name.bare in SEEDS],
+        has_seeds=any(ColumnName(words.get(name, name)).bare in SEEDS for name in blocks),
         performance_name=_name_of_performance(names, units.get("time_to_finish")),
         notes=notes,
     )
@@ -104,9 +97,13 @@ def columns_of(
 
 
 def _names(
-    table: Table, columns: Mapping[str, str], ignore: Sequence[str], complaints: Complaints
-) -> tuple[dict[str, str], list[str], list[str]]:
-    """Return the name of each known column, columns left as parameters, and those of the block."""
+    table: Table, columns: Mapping[str, str], ignore: Sequence[str], suspected: dict[str, str]
+) -> tuple[dict[str, str], list[str], list[str], list[IndicatorError]]:
+    """Return the names of known columns, of those left as parameters, of the block, and errors.
+
+    Args:
+        suspected: takes what a column may be whose name is nearly a name of it.
+    """
     path = table.source
     header = _with_content(table, columns)
     for column in columns:
@@ -123,43 +120,46 @@ def _names(
     settled = {*ignore, *names.values(), *table.left_out}
     parameters = list[str]()
     of_robots = list[str]()
+    errors = list[IndicatorError]()
     blocks = [names["seed"]] if "seed" in names else []
     for name in dict.fromkeys(header):
         if not name or name in settled:
             continue
         if header.count(name) > 1:
-            complaints.add(
+            errors.append(
                 IndicatorError(f"{path} has two columns {name!r}: should have one of that name")
             )
             continue
-        if is_robot(name) or _may_be_robots(table.columns[name]):
+        cells = table.columns[name]
+        if cells.name.tells_robots or _may_be_robots(cells):
             of_robots.append(name)
             continue
-        meaning = meaning_of(name)
+        meaning = cells.name.meaning
         if meaning is None or (meaning in chosen and name not in COLUMN_NAMES):
-            close = difflib.get_close_matches(bare(name), ENGLISH_NAMES, n=1, cutoff=0.75)
-            if close and meaning is None and len(bare(name)) > 3 and not table.kind:
-                complaints.suspected[name] = MEANING[close[0]]
-                complaints.add(_misspelled(path, name, close[0]))
+            word = cells.name.bare
+            close = difflib.get_close_matches(word, ENGLISH_NAMES, n=1, cutoff=0.75)
+            if close and meaning is None and len(word) > 3 and not table.kind:
+                suspected[name] = MEANING[close[0]]
+                errors.append(_misspelled(path, name, close[0]))
                 continue
             parameters.append(name)
         elif meaning == "seed":
             blocks.append(name)
             names[meaning] = " and ".join(blocks)
         elif meaning in names:
-            complaints.add(_both(path, meaning, names[meaning], name))
+            errors.append(_both(path, meaning, names[meaning], name))
         else:
             names[meaning] = name
     if of_robots and "time" not in names:
         name = quote(of_robots[0])
-        complaints.add(
+        errors.append(
             IndicatorError(
                 f"{path} has a column {of_robots[0]!r}, so its rows may be robots instead of "
                 f"trials: {ONE_TRIAL_A_ROW} by --sum-over {name}, or leave the column out; where "
                 f"it is the swarm's size, say --column robots={name}"
             )
         )
-    return names, parameters, blocks
+    return names, parameters, blocks, errors
 
 
 def _misspelled(path: str, name: str, word: str) -> IndicatorError:
@@ -179,7 +179,7 @@ def _both(path: str, meaning: str, first: str, second: str) -> IndicatorError:
 
 def _may_be_robots(cells: Cells) -> bool:
     """Return whether the German "Roboter" may tell robots apart: it is their number or a robot."""
-    if bare(cells.name) != "roboter":
+    if cells.name.bare != "roboter":
         return False
     numbers = sorted({int(text) for text in cells.texts if text.isdecimal() and len(text) < 9})
     return len(numbers) > 2 and numbers == [*range(numbers[0], numbers[0] + len(numbers))]
@@ -190,113 +190,11 @@ def _with_content(table: Table, columns: Mapping[str, str]) -> list[str]:
     return [
         name
         for name in table.header
-        if meaning_of(name) != "seed"
+        if table.columns[name].name.meaning != "seed"
         or name in columns.values()
         or not table.cells
         or any(table.columns[name].texts)
     ]
-
-
-def _units_of_times(table: Table, names: Mapping[str, str]) -> dict[str, NamedUnit]:
-    """Return the units that the names of times have, by what the column is.
-
-    Raises:
-        IndicatorError: a time has a unit of something else, times have units that cannot be
-            converted into each other, or contacts are not per minute.
-    """
-    units: dict[str, NamedUnit] = {}
-    for column in TIMES:
-        name = names.get(column, "")
-        try:
-            unit = unit_of_time(name)
-        except ValueError as error:
-            raise IndicatorError(
-                f"{table.source}: {name!r} ({column}) has the unit {error}: should have one of "
-                f"time, {', '.join(SECONDS)} or steps: rename it, or leave it out by "
-                f"--ignore {name!r}"
-            ) from None
-        if unit:
-            units[column] = unit
-    in_steps = {column: unit for column, unit in units.items() if unit.unit not in SECONDS}
-    if 0 < len(in_steps) < len(units):
-        named = " and ".join(repr(names[column]) for column in units)
-        raise IndicatorError(
-            f"{table.source}: {named} have times in steps and in others: should have one unit"
-        )
-    contacts = names.get("contacts", "")
-    if not is_per_minute(contacts):
-        raise IndicatorError(
-            f"{table.source}: {contacts!r}: contacts should be per robot and minute"
-        )
-    return units
-
-
-def _with_signs(
-    table: Table,
-    numbers: Sequence[str],
-    decimal: str | None,
-    thousands: str | None,
-    complaints: Complaints,
-) -> tuple[Table, list[str]]:
-    """Return a table with the signs in its numbers, and notes on what was guessed.
-
-    Args:
-        numbers: the names of columns that hold numbers.
-        complaints: take a column in which a sign may stand before decimals or between thousands.
-    """
-    notes = []
-    columns = [table.columns[name] for name in numbers if name in table.columns]
-    decimal = decimal or table.decimal or ("," if thousands == "." else None)
-    if decimal is None and thousands is None and (text := _both_signs(columns)):
-        signs = re.sub(r"[\d+-]", "", text)
-        thousands = signs[0]
-        decimal = signs[-1]
-        notes.append(
-            f"Numbers are taken to have {thousands} between thousands and {decimal} before "
-            f"decimals, as in {text}."
-        )
-    if decimal is None and (text := _decimal_comma(columns)):
-        decimal = ","
-        notes.append(f"Decimals are taken to have a comma, as in {text}.")
-    if decimal is None and thousands is None:
-        for cells in columns:
-            with complaints.noted():
-                _refuse_thousands(cells)
-    return replace(table, decimal=decimal or ".", thousands=thousands), notes
-
-
-def _both_signs(columns: Sequence[Cells]) -> str | None:
-    """Return a cell with a sign between thousands and one before decimals; None: none has both."""
-    texts = {text for cells in columns for text in cells.texts}
-    return min((text for text in texts if _BOTH_SIGNS.fullmatch(text)), default=None)
-
-
-def _decimal_comma(columns: Sequence[Cells]) -> str | None:
-    """Return a cell whose comma stands before decimals, if no cell has a point; None: none."""
-    texts = {text for cells in columns for text in cells.texts if not means_no_number(text)}
-    if any("." in text for text in texts):
-        return None
-    return min((text for text in texts if _DECIMAL_COMMA.fullmatch(text)), default=None)
-
-
-def _refuse_thousands(cells: Cells) -> None:
-    """Refuse a column in which "1.200" beside "980" may be 1200 or 1.2."""
-    first = {text: row for row, text in reversed([*enumerate(cells.texts)]) if text}
-    plain_numbers = {text: row for text, row in first.items() if text.isdecimal()}
-    with_points = [text for text in first if re.fullmatch(r"[1-9]\d{0,2}\.\d{3}", text)]
-    if not (plain_numbers and with_points) or len(plain_numbers) + len(with_points) < len(first):
-        return
-    largest = max(plain_numbers, key=float)
-    smallest = min(with_points, key=float)
-    if float(largest) >= 10.0 * float(smallest):
-        table = cells.table
-        raise cells.error(
-            first[smallest],
-            f"is {smallest.replace('.', '')} or {float(smallest):g}, beside {largest} in "
-            f"{table.line_word} {table.lines[plain_numbers[largest]]}: should be without a sign "
-            "between thousands; or say --thousands . where it is one, --decimal . where decimals "
-            "have a point",
-        )
 
 
 def _parameters(
@@ -330,13 +228,13 @@ def _name_of_performance(names: Mapping[str, str], unit: NamedUnit | None) -> st
     if "time" in names:
         return "deliveries"
     name = names.get("performance", "P")
-    return "P" if bare(name) in ("p", "performance", CELLS) else name
+    return "P" if ColumnName(name).bare in ("p", "performance", CELLS) else name
 
 
 def _refuse_rows_of_robots(columns: Columns) -> None:
     """Refuse rows that differ in an ignored column of robots and in what each delivered alone."""
     table = columns.table
-    of_robots = [cells for cells in columns.ignored if is_robot(cells.name)]
+    of_robots = [cells for cells in columns.ignored if cells.name.tells_robots]
     meanings = columns.by_meaning
     if not of_robots or "time" in meanings:  # a row of an event log is a delivery, whoever made it
         return
@@ -355,25 +253,6 @@ def _refuse_rows_of_robots(columns: Columns) -> None:
                     f"in {robot.name!r} and in what was delivered alone, so these may be robots of "
                     f"one trial: {ONE_TRIAL_A_ROW}, as by --sum-over {robot.name!r}{hint}"
                 )
-
-
-def is_robot(name: str) -> bool:
-    """Return whether a column tells robots apart, by its name."""
-    return _ROBOT.fullmatch(bare(name)) is not None
-
-
-def meaning_of(name: str) -> str | None:
-    """Return what a column is by its name, a key of `COLUMN_NAMES`; None: it is not known."""
-    word = bare(name)
-    stem = without_unit(word)
-    is_time = MEANING.get(stem) in TIMES and stem != "length"  # whose "min" may be the least
-    return MEANING.get(stem if is_time else word)
-
-
-def bare(name: str) -> str:
-    """Return a column's name in small letters, without accents and unit: "Time [s]" is "time"."""
-    without_unit = re.sub(r"\s*[\[(].*?[\])]\s*", " ", name)
-    return re.sub(r"\W+", "_", plain(without_unit)).strip("_")
 
 
 def _one_of(name: str, choices: Iterable[str]) -> str:

@@ -62,7 +62,7 @@ class Row:
 def numbered_blocks(columns: Columns) -> dict[str, int]:
     """Return a number for each block, by its name; none where blocks are numbers."""
     seed = columns.by_meaning.get("seed")
-    if seed is None or (len(columns.blocks) == 1 and seed.are_like_numbers()):
+    if seed is None or (len(columns.blocks) == 1 and seed.are_like_numbers):
         return {}
     return {name: number for number, name in enumerate(sorted({*seed.texts} - {""}))}
 

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
+
+from swarm_logistics_env.spi.inputs import IndicatorError
+
+from .words import TIMES
 
 STEPS = "steps"  # of a simulation, however long
 SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
@@ -55,6 +59,42 @@ class NamedUnit(NamedTuple):
     word: str
     start: int
     unit: str
+
+
+def units_of_times(source: str, names: Mapping[str, str]) -> dict[str, NamedUnit]:
+    """Return the units that the names of times have, by what the column is.
+
+    Args:
+        source: what messages call the file.
+        names: of columns, by what they are.
+
+    Raises:
+        IndicatorError: a time has a unit of something else, times have units that cannot be
+            converted into each other, or contacts are not per minute.
+    """
+    units: dict[str, NamedUnit] = {}
+    for column in TIMES:
+        name = names.get(column, "")
+        try:
+            unit = unit_of_time(name)
+        except ValueError as error:
+            raise IndicatorError(
+                f"{source}: {name!r} ({column}) has the unit {error}: should have one of "
+                f"time, {', '.join(SECONDS)} or steps: rename it, or leave it out by "
+                f"--ignore {name!r}"
+            ) from None
+        if unit:
+            units[column] = unit
+    in_steps = {column: unit for column, unit in units.items() if unit.unit not in SECONDS}
+    if 0 < len(in_steps) < len(units):
+        named = " and ".join(repr(names[column]) for column in units)
+        raise IndicatorError(
+            f"{source}: {named} have times in steps and in others: should have one unit"
+        )
+    contacts = names.get("contacts", "")
+    if not is_per_minute(contacts):
+        raise IndicatorError(f"{source}: {contacts!r}: contacts should be per robot and minute")
+    return units
 
 
 def unit_of_time(name: str) -> NamedUnit | None:

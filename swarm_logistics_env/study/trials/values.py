@@ -8,10 +8,9 @@ from dataclasses import replace
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
-from .fault_names import usual_fault
+from .column_name import ColumnName
 from .table import Table, like_a_number
 from .trial import NO_FAULT_WORD
-from .trial_columns import meaning_of
 from .words import CONSTANTS, MEANING, NOT_KNOWN
 
 _REPLACEMENT = re.compile(r"([^:]+):(.*)=([^=]*)", re.DOTALL)
@@ -29,17 +28,17 @@ def with_constants(table: Table, columns: dict[str, str]) -> Table:
         if value in table.index or meaning not in CONSTANTS or not like_a_number(value):
             continue
         texts = [value] * len(table.cells)
-        faults = [name for name in table.header if meaning_of(name) == "fault"]
+        faults = [name for name in table.columns if ColumnName(name).meaning == "fault"]
         fault = columns.get("fault", next(iter(faults), ""))
         if meaning == "faulty" and fault in table.index:
-            names = [row[table.index[fault]] for row in table.cells]
-            harmless = [*map(usual_fault, names)]
+            cells = table.columns[fault]
+            usual = cells.usual_faults
             texts = [
-                "" if word == NO_FAULT_WORD or name in NOT_KNOWN else value
-                for name, word in zip(names, harmless)
+                "" if usual[text] == NO_FAULT_WORD or text in NOT_KNOWN else value
+                for text in cells.texts
             ]
-        cells = [[*row, text] for row, text in zip(table.cells, texts)]
-        table = replace(table, header=[*table.header, column], cells=cells)
+        rows = [[*row, text] for row, text in zip(table.cells, texts)]
+        table = replace(table, header=[*table.header, column], cells=rows)
         columns[column] = column
     return table
 
@@ -76,8 +75,11 @@ def with_values(table: Table, columns: Mapping[str, str], values: Sequence[str])
 
 
 def _column_number(table: Table, columns: Mapping[str, str], column: str, option: str) -> int:
-    by_meaning = {meaning_of(name): name for name in table.header} | {**table.meanings}
-    by_meaning |= {MEANING.get(word): name for word, name in columns.items()}
+    by_meaning: dict[str | None, str] = {
+        **{ColumnName(name).meaning: name for name in table.header},
+        **table.meanings,
+        **{MEANING.get(word): name for word, name in columns.items()},
+    }
     name = column if column in table.index else by_meaning.get(MEANING.get(column, column))
     if name not in table.index:
         raise IndicatorError(

@@ -14,11 +14,10 @@ from shlex import quote
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
-from .fault_names import usual_fault
-from .table import Table, holds_numbers
+from .column_name import ColumnName
+from .table import Table
 from .trial import NO_FAULT_WORD
-from .trial_columns import bare, is_robot, meaning_of
-from .words import CELLS, COLUMN_NAMES, MEANING, REPETITIONS, plain
+from .words import CELLS, COLUMN_NAMES, MEANING, REPETITIONS, plain, usual_fault
 
 MEASURED = ("performance", "time", "time_to_finish")
 _ROBOTS = "|".join(word.replace("_", " ") for word in COLUMN_NAMES["n_robots"])
@@ -55,16 +54,18 @@ def long_of(
     """
     named = {name: MEANING.get(column) for column, name in columns.items()}
     named |= {name: meaning for meaning, name in table.meanings.items()}
-    meanings_of_names = {name: named.get(name) or meaning_of(name) for name in table.header}
+    all_cells = table.columns_in_order
+    meanings = [named.get(cells.name) or cells.name.meaning for cells in all_cells]
     is_long = any(
-        meaning in MEASURED and name not in ignore for name, meaning in meanings_of_names.items()
+        meaning in MEASURED and cells.name not in ignore
+        for cells, meaning in zip(all_cells, meanings)
     )
     numbers = [
         number
-        for number, name in enumerate(table.header)
-        if name not in ("", *ignore, *table.left_out)
-        and not (meanings_of_names[name] or is_robot(name))
-        and holds_numbers([row[number] for row in table.cells])
+        for number, (cells, meaning) in enumerate(zip(all_cells, meanings))
+        if cells.name not in ("", *ignore, *table.left_out)
+        and not (meaning or cells.name.tells_robots)
+        and cells.are_mostly_numbers
     ]
     if wide is not None:
         if is_long or len(numbers) < 2:
@@ -72,22 +73,25 @@ def long_of(
                 f"--wide {wide}: {table.source} has no two columns that could be conditions: it "
                 f"has {', '.join(map(repr, table.header))}"
             )
-        return _melted(table, {n: _as_said(table, n, wide) for n in numbers}, columns)
-    if is_long:
-        return table
-    names = {number: _UNIT.sub("", table.header[number]) for number in numbers}
+        conditions = {number: _as_said(table, number, wide) for number in numbers}
+    else:
+        names = {number: _UNIT.sub("", table.header[number]) for number in numbers}
+        conditions = {} if is_long else _read_off(names)
+    return _melted(table, conditions, columns) if conditions else table
+
+
+def _read_off(names: Mapping[int, str]) -> dict[int, Condition]:
+    """Return what columns are of by their names; empty: these do not tell it."""
     for read in (_size, _value, _repetition):
         conditions = {number: read(name) for number, name in names.items()}
         read_off = {n: condition for n, condition in conditions.items() if condition is not None}
         parts = {name for condition in read_off.values() for name in condition}
         if len(read_off) > 1 and len(parts) < 2:
-            return _melted(table, read_off, columns)
+            return read_off
     faults = {number: _fault(name) for number, name in names.items()}
     is_told = all("faulty" in x or x["fault"] == NO_FAULT_WORD for x in faults.values())
     has_sound = any(x["fault"] == NO_FAULT_WORD for x in faults.values())
-    if not (len(faults) > 1 and is_told and has_sound):
-        return table
-    return _melted(table, faults, columns)
+    return faults if len(faults) > 1 and is_told and has_sound else {}
 
 
 def options_for_wide(names: Sequence[str]) -> str:
@@ -104,7 +108,7 @@ def _size(name: str) -> Condition | None:
 
 def _value(name: str) -> Condition | None:
     match = _VALUE.fullmatch(name)
-    if match is None or bare(match[1]) in ("m", "run", "trial"):
+    if match is None or ColumnName(match[1]).bare in ("m", "run", "trial"):
         return None
     unit = f" [{match[3]}]" if match[3] else ""
     return {f"{match[1].strip()}{unit}": match[2].replace(",", ".")}

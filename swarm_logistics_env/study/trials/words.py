@@ -10,9 +10,12 @@ import tomllib
 import unicodedata
 from pathlib import Path
 
+from .trial import NO_FAULT_WORD, REMOVED_WORD, REPEATED
+
 CELLS = "cells"  # the column of what was measured, of a wide table
 MORE_IS_BETTER = "more_is_better"  # for --column, of a performance that is a time by its name
 CONSTANTS = ("n_robots", "faulty", "work")  # numbers that may be the same in all trials
+TIMES = ("onset", "time", "time_to_finish", "duration")  # columns
 # What programs and people write for no value: a fault so written may be none.
 NOT_KNOWN = ("", "na", "n/a", "nan", "null")
 _LANGUAGES = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
@@ -64,6 +67,24 @@ def plain(text: str) -> str:
 def means_no_number(text: str) -> bool:
     """Return whether a cell stands for a number that is not there."""
     return text.casefold() in _NO_NUMBER
+
+
+def usual_fault(name: str) -> str | None:
+    """Return what a fault is called by a word that is known in any language; None: it is not."""
+    word = plain(name)
+    if word in NO_FAULT_WORDS or name == "-":
+        return NO_FAULT_WORD
+    if word in REMOVED_WORDS:
+        return REMOVED_WORD
+    return REPEATED if word in (REPEATED, "none again") else None
+
+
+def says_yes(cell: str) -> bool | None:
+    """Return what a word says; None: it is neither for yes nor for no."""
+    word = plain(cell)
+    if word in YES_WORDS:
+        return True
+    return False if word in NO_WORDS else None
 
 
 def is_translated(word: str) -> bool:

@@ -8,8 +8,8 @@ from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from swarm_logistics_env.spi.inputs import IndicatorError
+from swarm_logistics_env.study.trials.column_name import ColumnName
 from swarm_logistics_env.study.trials.table import NoTrialsError, Table
-from swarm_logistics_env.study.trials.trial_columns import bare
 from swarm_logistics_env.study.trials.words import MEANING
 
 TRIAL_SUFFIXES = (".csv", ".tsv", ".txt", ".json", ".xlsx", ".xlsm", ".parquet")
@@ -95,7 +95,7 @@ def _tables(
 
 
 def _has_columns(header: Sequence[str], columns: Mapping[str, str]) -> bool:
-    return any(bare(name) in MEANING or name in columns.values() for name in header)
+    return any(ColumnName(name).bare in MEANING or name in columns.values() for name in header)
 
 
 def _first_line(path: Path) -> list[str]:
@@ -184,7 +184,9 @@ def _joined(
             first_names = _listed(named[first_path])
             raise IndicatorError(f"{path} names {names}, but {first_path} {first_names}")
     labels = [*named[first_path]]
-    names_policy = any(MEANING.get(bare(name)) == "policy" for name in (*header, *labels, *columns))
+    names_policy = any(
+        MEANING.get(ColumnName(name).bare) == "policy" for name in (*header, *labels, *columns)
+    )
     labels += [] if names_policy else ["policy"]
     labels = [label for label in labels if label not in header]
     cells = []

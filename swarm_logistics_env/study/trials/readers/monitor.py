@@ -6,8 +6,8 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+from swarm_logistics_env.study.trials.column_name import ColumnName
 from swarm_logistics_env.study.trials.table import Table
-from swarm_logistics_env.study.trials.trial_columns import bare
 from swarm_logistics_env.study.trials.words import MEANING
 
 from . import csv_text
@@ -29,7 +29,7 @@ def read(path: Path, content: bytes, digest: str) -> Table | None:
     except (ValueError, RecursionError):
         return None
     table = csv_text.read(path, rest, digest)
-    chosen = [name for name in table.header if MEANING.get(bare(name)) == "performance"]
+    chosen = [name for name in table.header if MEANING.get(ColumnName(name).bare) == "performance"]
     performance = chosen[0] if chosen else "r"
     of_environment = f" of {environment}" if environment else ""
     note = (
