@@ -75,11 +75,8 @@ def with_values(table: Table, columns: Mapping[str, str], values: Sequence[str])
 
 
 def _column_number(table: Table, columns: Mapping[str, str], column: str, option: str) -> int:
-    by_meaning: dict[str | None, str] = {
-        **{ColumnName(name).meaning: name for name in table.header},
-        **table.meanings,
-        **{MEANING.get(word): name for word, name in columns.items()},
-    }
+    by_meaning = {ColumnName(name).meaning: name for name in table.header} | {**table.meanings}
+    by_meaning |= {MEANING.get(word): name for word, name in columns.items()}
     name = column if column in table.index else by_meaning.get(MEANING.get(column, column))
     if name not in table.index:
         raise IndicatorError(
