@@ -176,3 +176,17 @@ def test_a_stock_is_the_less_deep_the_longer_robots_brake_and_the_smaller_they_a
     policy: Any = load("homing-stock")
     policy.configure(Scenario(**fields))
     assert Parameters(*policy._values).near == pytest.approx(depth)
+
+
+@pytest.mark.parametrize("name", ["homing", "homing-stock"])
+def test_every_length_goes_with_the_radius_of_the_robots_and_nothing_else_does(name: str) -> None:
+    policy: Any = load(name)
+    values = []
+    for radius in (0.125, 0.05):
+        policy.configure(Scenario(robot_radius=radius, n_requests=2))
+        values.append(policy.parameters_type.for_kernels()(*policy._values)._asdict())
+    fitted, small = values
+    lengths = {name for name in fitted if name.endswith("_range")} | {"clearance", "near"}
+    changed = {name for name in fitted if small[name] != fitted[name]}
+    assert changed == lengths & fitted.keys()
+    assert all(small[name] == pytest.approx(0.4 * fitted[name]) for name in changed)

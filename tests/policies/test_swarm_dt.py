@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.policies import SwarmDT, SwarmDTParameters, load
-from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026
+from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026, Parameters
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.scenario import SOURCES
 
@@ -166,3 +166,15 @@ def test_every_constant_says_whether_it_has_a_source_or_was_fitted() -> None:
         kind, _, source = origin.partition(": ")
         assert kind in ("source", "fitted"), name
         assert source in (SOURCES if kind == "source" else {""}), name
+
+
+def test_the_lengths_of_the_tuned_one_alone_go_with_the_radius_of_the_robots() -> None:
+    small = Scenario(robot_radius=0.05)
+    for name, scale in (("swarm-dt-tuned", 0.4), ("swarm-dt", 1.0)):
+        policy: Any = load(name)
+        policy.configure(small)
+        fitted = policy.parameters
+        values = Parameters(*policy._values)
+        for length in ("avoidance_range", "item_avoidance_range", "wall_distance"):
+            assert getattr(values, length) == pytest.approx(scale * getattr(fitted, length))
+        assert values.diffusion == fitted.diffusion
