@@ -55,12 +55,12 @@ def minimum_detectable_effect(estimate: Estimate, power: float = 0.8) -> float |
         sides = (-1, 1) if distance < lowest else (1,)
         return power - min(_power_at(estimate, side * distance, n, PLANNED_LIMIT) for side in sides)
 
-    enough = lowest / 1024.0
-    while excess(enough) > 0.0:
-        enough *= 2.0
-        if enough > _FARTHEST * lowest:
-            return None
-    return float(brentq(excess, 0.0, enough, xtol=1e-9 * enough))
+    farthest = _FARTHEST * lowest
+    return (
+        float(brentq(excess, 0.0, farthest, xtol=1e-12 * lowest))
+        if excess(farthest) <= 0.0
+        else None
+    )
 
 
 def seeds_for_power(estimate: Estimate, effect: float, power: float = 0.8) -> int | None:

@@ -283,6 +283,12 @@ def forest(canvas: Canvas, columns: Mapping[str, Rows], title: str = "") -> None
         axes.set_xlabel(x_label)
     grid[0, 0].set_title(title)
     grid[0, 0].set_yticks(range(len(rows)), [label for label, _ in rows])
+    for label, tick, (_, points) in zip(
+        grid[0, 0].get_yticklabels(), grid[0, 0].yaxis.get_major_ticks(), rows
+    ):
+        if not points:
+            label.set_fontweight("bold")
+            tick.tick1line.set_visible(False)
     grid[0, 0].set_ylim(len(rows) - 0.4, -0.6)
     series = {point.series for column in columns.values() for _, row in column for point in row}
     if len(series) > 1:

@@ -38,24 +38,24 @@ def forest_points(results: StudyResults, answer: Answer) -> tuple[Point, ...]:
     )
 
 
-def forest_label(answer: Answer) -> str:
-    """Return the label of the values' axis, e.g. "R, FT: value"."""
-    symbols = dict.fromkeys(line.verdict.compared.indicator for line in answer.lines)
-    return f"{', '.join(symbols)}: value"
-
-
 def forest_figure(results: StudyResults, answer: Answer, points: Sequence[Point]) -> Figure:
-    """Return the lines of the answer as a forest of intervals.
+    """Return the lines of the answer as a forest of intervals, below the names of indicators.
 
     Where there are several policies or tasks, those with the same question share its row.
     """
     groups = answer.lines_by_subject
     # What stands between two policies has the colour of neither.
     subjects = sorted(groups, key=lambda subject: groups[subject][0].verdict.compares_policies)
-    rows: dict[str, list[Point]] = {}
+    by_indicator: dict[str, dict[str, list[Point]]] = {}
     for line, point in zip(answer.lines, points):
         of_subject = point._replace(series=line.subject, style=subjects.index(line.subject))
-        rows.setdefault(line.question, []).append(of_subject)
+        rows_of = by_indicator.setdefault(line.verdict.compared.definition.heading, {})
+        compares = line.verdict.compares_policies
+        label = line.question if compares else line.name(with_subject=False)
+        rows_of.setdefault(label, []).append(of_subject)
+    rows: list[tuple[str, list[Point]]] = []
+    for heading, rows_of in by_indicator.items():
+        rows += [(f"{heading[0].upper()}{heading[1:]}", []), *rows_of.items()]
     verdicts = [line.verdict for line in answer.lines]
     # Where there are several, the legend names them.
     title = results.policies[0] if len(subjects) == 1 else ""
@@ -63,8 +63,8 @@ def forest_figure(results: StudyResults, answer: Answer, points: Sequence[Point]
         "answer",
         f"{answer.scope} Every question with its interval.",
         _rows(results, verdicts),
-        0.9 + sum(max(0.2, 0.05 + 0.1 * len(of_row)) for of_row in rows.values()),
-        partial(drawing.forest, columns={forest_label(answer): [*rows.items()]}, title=title),
+        0.9 + sum(max(0.2, 0.05 + 0.1 * len(of_row)) for _, of_row in rows),
+        partial(drawing.forest, columns={"value of the indicator": rows}, title=title),
         note_on_verdicts(results, verdicts),
     )
 

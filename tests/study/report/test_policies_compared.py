@@ -65,8 +65,11 @@ def test_policies_share_the_row_of_a_question_in_the_figure_and_the_legend_names
     figure.draw(canvas)
     (axes,) = canvas.axes
     labels = [tick.get_text() for tick in axes.get_yticklabels()]
-    of_both = ["R FM1, 1 of 25", "R FM1, 3 of 25", "R FM4, 1 of 25", "R FM4, 3 of 25"]
-    assert (len(answer(results).lines), labels[-4:]) == (len(labels) + 4, of_both)
+    of_both = ["FM1, 1 of 25", "FM1, 3 of 25", "FM4, 1 of 25", "FM4, 3 of 25"]
+    assert labels[-5:] == ["Robustness R", *of_both]
+    # Two headings stand among the labels.
+    assert len(answer(results).lines) == len(labels) - 2 + 4
+    assert [label.get_fontweight() for label in axes.get_yticklabels()].count("bold") == 2
     (legend,) = canvas.legends
     names = ["homing against swarm-dt", "homing", "swarm-dt"]
     assert [text.get_text() for text in legend.get_texts()] == names
