@@ -182,7 +182,7 @@ class Definition:
         function: from performances over seeds to an `Estimate`.
         arguments: the function's further arguments, from what differs.
         adjectives: threshold to what a swarm above it is called.
-        at_zero: what it means that the indicator is 0, for a reader who knows none of them.
+        at_zero: what the indicator is, and what 0 means, for a reader who knows none of them.
     """
 
     symbol: str
@@ -243,7 +243,7 @@ DEFINITIONS: dict[str, Definition] = {
             function=scalability,
             arguments=lambda c: {"n": int(c.before), "m": int(c.after - c.before)},
             adjectives={0.0: "scalable", 1.0: "superlinear"},
-            at_zero="S = 0: more robots bring no more, 1: in proportion",
+            at_zero="S = growth of P / growth of N; 0: more robots bring no more, 1: in proportion",
         ),
         Definition(
             symbol="FT",
@@ -253,7 +253,8 @@ DEFINITIONS: dict[str, Definition] = {
             function=fault_tolerance,
             arguments=lambda c: {"n": c.n_robots, "m": int(c.after)},
             adjectives={0.0: "tolerant"},
-            at_zero="FT = 0: P is as if the faulty robots were absent",
+            at_zero="FT = (P with the faulty robots - P without them) / P of all sound; "
+            "0: as if they were absent",
         ),
         Definition(
             symbol="R",
@@ -263,7 +264,8 @@ DEFINITIONS: dict[str, Definition] = {
             function=robustness,
             arguments=lambda c: {"n": c.n_robots, "m": int(c.after)},
             adjectives={0.0: "robust"},
-            at_zero="R = 0: P falls by the share of robots that are faulty, m/N: not at all",
+            at_zero="R = P with m of N faulty / P of all sound - (1 - m/N); 0: P falls by m/N, "
+            "m/N: not at all",
         ),
         Definition(
             symbol="A",
@@ -273,7 +275,8 @@ DEFINITIONS: dict[str, Definition] = {
             function=adaptability,
             arguments=lambda c: {"x_o": c.before, "x_new": c.after},
             adjectives={0.0: "adaptable", 1.0: "P has grown"},
-            at_zero="A = 0: P falls by the share of the change, 1: not at all",
+            at_zero="A = 1 - fall of P / change of the parameter, as shares; 0: P falls by as "
+            "large a share, 1: not at all",
         ),
         Definition(
             symbol="change",

@@ -9,8 +9,10 @@ from typing import NamedTuple
 from more_itertools import map_reduce
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
+from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import (
+    DECIDED,
     UNAFFECTED,
     UNTESTABLE,
     Verdict,
@@ -19,7 +21,7 @@ from swarm_logistics_env.study.verdicts.verdict import (
 from . import section
 from .answer_notes import notes
 from .performances import performances
-from .policies_compared import compare_policies
+from .policies_compared import compare_policies, factor_of
 from .section import Section
 
 _MOST_WITH_SENTENCES = 2  # policies and tasks; more have a table, and sentences together
@@ -49,20 +51,38 @@ class Line(NamedTuple):
         return f"{self.subject}: {name}" if with_subject else name
 
     @property
+    def heading(self) -> str:
+        """The indicator by its name and symbol, or what is compared between policies."""
+        if self.verdict.compares_policies:
+            return "times P"
+        heading = self.verdict.compared.definition.heading
+        return f"{heading[0].upper()}{heading[1:]}"
+
+    @property
+    def threshold(self) -> float:
+        """What the value is tested against."""
+        return 1.0 if self.verdict.compares_policies else self.verdict.compared.threshold
+
+    @property
+    def estimate(self) -> Interval | None:
+        """The indicator, or P of a policy in times that of another, with its limits; None: none."""
+        interval = self.verdict.interval
+        return factor_of(interval) if interval and self.verdict.compares_policies else interval
+
+    @property
     def value(self) -> str:
         """The value, with a mark where P is capped."""
-        value = self.verdict.value
-        if value is None:
+        if self.estimate is None:
             return section.NOTHING
         mark = section.SATURATED if self.verdict.saturated else ""
-        return section.fixed(value, 2, [self.verdict.compared.threshold]) + mark
+        return section.fixed(self.estimate.value, 2, [self.threshold]) + mark
 
     @property
     def interval(self) -> str:
         """The interval; empty: there is none, or the value is exact."""
-        if self.verdict.estimate is None or self.verdict.conclusion == UNAFFECTED:
+        if self.estimate is None or self.verdict.conclusion == UNAFFECTED:
             return ""
-        return section.limits(self.verdict.estimate, 2)
+        return section.limits(self.estimate, 2, [self.threshold])
 
     @property
     def level(self) -> str:
@@ -126,6 +146,9 @@ class Answer(NamedTuple):
     def opening(self) -> list[str]:
         """The sentences before the overview: what is compared, and how much was asked."""
         sentences = [self.comparison] if self.comparison else []
+        words = {line.verdict.on_property.adjusted for line in self.lines}
+        if len(self.lines) > 1 and not words & {*DECIDED}:
+            sentences.insert(0, f"None of {len(self.lines)} questions is decided.")
         return sentences if len(self.subjects) == 1 else [*sentences, self.scope]
 
     @property
@@ -166,9 +189,8 @@ class Answer(NamedTuple):
         return question, line.value, self.interval(line), line.verdict.in_words
 
     def interval(self, line: Line) -> str:
-        """Return the interval of a line, with its level if that is another one than most have."""
-        level = line.level if line.level != self.level else ""
-        return f"{line.interval} {level}".strip()
+        """Return the interval of a line, with a letter if its level is none that most have."""
+        return f"{line.interval} {letters_of(self.lines, self.level).get(line.level, '')}".strip()
 
     @property
     def section(self) -> Section:
@@ -184,6 +206,8 @@ def answer(results: StudyResults) -> Answer:
     performance_of = performances(results)
     lines = list(_lines(results))
     level = _common_level(lines)
+    letters = letters_of(lines, level)
+    of_levels = [f"{letter}: interval of {other}." for other, letter in letters.items()]
     subjects = tuple(
         SubjectAnswer(
             name,
@@ -202,7 +226,7 @@ def answer(results: StudyResults) -> Answer:
         _scope(results),
         subjects,
         tuple(lines),
-        notes(results, level),
+        (*of_levels, *notes(results, level)),
         results.seeds_text,
         level,
     )
@@ -221,6 +245,12 @@ def _common_level(lines: Sequence[Line]) -> str:
     """Return the level that most intervals have."""
     levels = Counter(line.level for line in lines if line.level)
     return levels.most_common(1)[0][0] if levels else section.P_LEVEL
+
+
+def letters_of(lines: Sequence[Line], level: str) -> dict[str, str]:
+    """Return a letter for each level of an interval that is none that most have."""
+    levels = dict.fromkeys(line.level for line in lines if line.level not in ("", level))
+    return {other: chr(ord("a") + number) for number, other in enumerate(levels)}
 
 
 def _overview(
@@ -254,7 +284,7 @@ def _lines(results: StudyResults) -> Iterator[Line]:
         question = verdict.question
         if verdict.compares_policies:
             subject = f"{verdict.after.name} against {subject}"
-            question = f"P of {verdict.after.name}, {verdict.after.condition}"
+            question = f"times P, {verdict.after.condition}"
         p = _p_before_and_after(results, verdict)
         lines.append(Line(subject, question, verdict, number, p))
     # Recorded trials may ask one question in several tables, at other values of a parameter.

@@ -18,12 +18,13 @@ from .more_seeds import more_seeds
 
 _FEW_ITEMS = 1.0  # in a run, of which shares say little
 _MOST_CONDITIONS = 2  # that a note of the answer names
+_TIMES = "times P: of the first policy in times that of the other"
 # What the words of verdicts mean: those that stand in an answer, in this order.
 _MEANINGS = {
     "decided": "supported: above 0; refuted: below 0",
     "compared": "more, less: of P than the policy behind 'against'",
-    "open": "open: neither an effect is shown nor that there is none",
-    "margin": "< {margin}: P changes by less than that, or P_F and P_S of FT differ by less",
+    "open": "open: neither an effect is shown nor that there is none; write neither",
+    "margin": "< {margin}: P is shown to differ by less than that share of P of the sound swarm",
     "stalls": "stalls: one run that stalls, unseen so far, could turn it",
     "trainings": "trainings: one that collapses, unseen so far, could turn it",
     "Holm": "Holm: clear as the only question, not among all on the indicator",
@@ -46,7 +47,7 @@ def notes(results: StudyResults, level: str) -> tuple[str, ...]:
         lines.append(_method(results, level))
     rest = "; ".join(_notes_that_apply(results))
     lines.append(f"{rest[:1].upper()}{rest[1:]}" if rest else "")
-    lines.append(_modes(results))
+    lines += [_modes(results), *_same_runs(results)]
     return tuple(f"{line}." for line in lines if line)
 
 
@@ -68,13 +69,25 @@ def _modes(results: StudyResults) -> str:
     return f"A faulty robot: {'; '.join(texts)}" if texts else ""
 
 
-def meanings(verdicts: Iterable[Verdict]) -> list[str]:
+def _same_runs(results: StudyResults) -> Iterator[str]:
+    """Yield which failure modes gave the same runs to a policy, each pair once."""
+    by_digests: dict[tuple[str, str, tuple[str, ...]], list[str]] = {}
+    for cell in results.cells:
+        setting = cell.arm.setting
+        digests = tuple(outcome.digest or "" for outcome in cell.outcomes)
+        if setting.kind == "fault" and setting.value and digests and all(digests):
+            names = by_digests.setdefault((cell.policy, cell.table, digests), [])
+            names += [setting.name] if setting.name not in names else []
+    pairs = {(policy, *names): None for (policy, *_), names in by_digests.items() if names[1:]}
+    for policy, *names in pairs:
+        yield f"Rows of {section.join_names(names)} that are equal ({policy}): the same runs"
+
+
+def meanings(verdicts: Sequence[Verdict]) -> list[str]:
     """Return what 0 means of these indicators, and the words that `Verdict.in_words` has."""
     words: set[str] = set()
-    zeros: dict[str, None] = {}
     margin = ""
     for verdict in verdicts:
-        zeros[verdict.compared.definition.at_zero] = None
         word = verdict.on_property.adjusted
         if word in ("supported", "refuted"):
             words.add("compared" if verdict.compares_policies else "decided")
@@ -92,7 +105,16 @@ def meanings(verdicts: Iterable[Verdict]) -> list[str]:
     of_words = (
         meaning.format(margin=margin) for word, meaning in _MEANINGS.items() if word in words
     )
-    return [*zeros, *of_words]
+    return [*zeros_of(verdicts), *of_words]
+
+
+def zeros_of(verdicts: Iterable[Verdict]) -> list[str]:
+    """Return what each indicator of these verdicts is, and what 0 means."""
+    zeros = (
+        _TIMES if verdict.compares_policies else verdict.compared.definition.at_zero
+        for verdict in verdicts
+    )
+    return [*dict.fromkeys(zeros)]
 
 
 def _notes_that_apply(results: StudyResults) -> Iterator[str]:

@@ -12,7 +12,7 @@ from .answer import Answer, answer
 from .answer_notes import warnings
 from .fault_sections import fault_sections
 from .figures import (
-    forest_figure,
+    forest_figures,
     forest_points,
     indicator_figures,
     policies_figure,
@@ -94,7 +94,7 @@ def document(results: StudyResults) -> Document:
     points = forest_points(results, study_answer)
     figures = (
         *policies_figure(results),
-        forest_figure(results, study_answer, points),
+        *forest_figures(results, study_answer, points),
         *indicator_figures(results),
     )
     trade_off = tuple(Section("", figures=(figure,)) for figure in trade_off_figure(results))

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from .points import Panel, Point, axis_limits, has_far_values
+from .points import Panel, Point, axis_limits, has_far_values, times_limits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -166,6 +166,7 @@ def _panel(axes: Axes, panel: Panel) -> None:
     for threshold in panel.thresholds:
         axes.axhline(threshold, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     spread = min(0.8, 0.24 * len(styles))
+    drawn: list[tuple[float, Point]] = []
     for point in panel.points:
         index = styles.index(point.style)
         x = categories.index(point.category) + spread * ((index + 0.5) / len(styles) - 0.5)
@@ -174,6 +175,7 @@ def _panel(axes: Axes, panel: Panel) -> None:
             axes.plot(x + 0.1, point.published, "x", color=INK, zorder=4, gid=gid)
         _dots(axes, x, 0.4 * spread / len(styles), point)
         _mark(axes, x, point)
+        drawn.append((x, point))
         if point.value is not None and point.saturated:
             axes.annotate("†", (x, point.value), (-9, 3), textcoords="offset points")
     axes.set_xticks(range(len(categories)), categories)
@@ -188,6 +190,7 @@ def _panel(axes: Axes, panel: Panel) -> None:
         axes.set_yscale("symlog", linthresh=1.0)
         axes.yaxis.set_major_formatter("{x:g}")
         axes.set_ylim(*(_MARGIN * end for end in axes.get_ylim()))
+    _add_arrows(axes, drawn)
     axes.set(ylabel=panel.y_label, xlabel=panel.x_label, title=panel.title)
 
 
@@ -268,7 +271,9 @@ def _mark(axes: Axes, at: float, point: Point, *, level: bool = False, shrink: f
 Rows: TypeAlias = Sequence[tuple[str, Sequence[Point]]]  # each with its label
 
 
-def forest(canvas: Canvas, columns: Mapping[str, Rows], title: str = "") -> None:
+def forest(
+    canvas: Canvas, columns: Mapping[str, Rows], title: str = "", *, is_of_times: bool = False
+) -> None:
     """Draw values with their intervals in rows, from top to bottom.
 
     Args:
@@ -276,10 +281,11 @@ def forest(canvas: Canvas, columns: Mapping[str, Rows], title: str = "") -> None
         columns: rows by the label of the axis of their values; with the same labels in each column.
             A point's `published` is its threshold; a label without points is a heading.
         title: above the first axes.
+        is_of_times: whether values are factors, so that the axis is logarithmic, about 1.
     """
     grid = canvas.subplots(1, len(columns), squeeze=False, sharey=True)
     for axes, (x_label, rows) in zip(grid[0], columns.items()):
-        _forest(axes, rows)
+        _forest(axes, rows, is_of_times=is_of_times)
         axes.set_xlabel(x_label)
     grid[0, 0].set_title(title)
     grid[0, 0].set_yticks(range(len(rows)), [label for label, _ in rows])
@@ -295,23 +301,55 @@ def forest(canvas: Canvas, columns: Mapping[str, Rows], title: str = "") -> None
         add_legend(canvas, grid[0, 0])
 
 
-def _forest(axes: Axes, rows: Rows) -> None:
+def _forest(axes: Axes, rows: Rows, *, is_of_times: bool) -> None:
+    drawn: list[tuple[float, Point]] = []
     for row, (_, points) in enumerate(rows):
         for index, point in enumerate(points):
             height = row + 0.6 * ((index + 0.5) / len(points) - 0.5)
             _mark(axes, height, point, level=True, shrink=min(1.0, 4.0 / len(points)))
-            if point.published:
+            drawn.append((height, point))
+            if point.published and not is_of_times:
                 axes.vlines(point.published, row - 0.4, row + 0.4, color=INK, linewidth=0.8)
-    axes.axvline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
+    axes.axvline(float(is_of_times), color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     axes.grid(visible=False, axis="y")
     axes.grid(visible=True, axis="x")
     all_points = [point for _, points in rows for point in points]
+    if is_of_times:
+        _scale_by_times(axes, all_points)
+        _add_arrows(axes, drawn, level=True)
+        return
     axes.set_xlim(axis_limits(all_points))
     is_of_indicators = any(point.published is not None for point in all_points)
     if is_of_indicators and has_far_values(all_points):
         axes.set_xscale("symlog", linthresh=1.0)
         axes.xaxis.set_major_formatter("{x:g}")
         axes.set_xlim(*(_MARGIN * end for end in axes.get_xlim()))
+    _add_arrows(axes, drawn, level=True)
+
+
+def _add_arrows(axes: Axes, drawn: Sequence[tuple[float, Point]], *, level: bool = False) -> None:
+    """Draw an arrow where an interval leaves the axis."""
+    low, high = axes.get_xlim() if level else axes.get_ylim()
+    for at, point in drawn:
+        colour = COLOURS[point.style % len(COLOURS)]
+        for end, limit, marker in (
+            (point.low, low, "<" if level else "v"),
+            (point.high, high, ">" if level else "^"),
+        ):
+            if end is not None and (end < low or end > high):
+                place = ([limit], [at]) if level else ([at], [limit])
+                axes.plot(*place, marker, color=colour, clip_on=False, markersize=4.0)
+
+
+def _scale_by_times(axes: Axes, points: Sequence[Point]) -> None:
+    """Let the axis be logarithmic, as far as values and intervals reach, but for their extremes."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    axes.set_xscale("log")
+    axes.set_xlim(*times_limits(points))
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter("{x:g}")
 
 
 def add_legend(canvas: Canvas, axes: Axes) -> None:

@@ -18,7 +18,8 @@ from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
 
 from . import drawing
-from .answer import Answer
+from .answer import Answer, Line
+from .answer_notes import zeros_of
 from .points import Panel, Point, cuts_intervals
 from .section import P_LEVEL, Figure, join_names, levels, slug
 
@@ -33,39 +34,64 @@ _COLUMNS = [
 
 def forest_points(results: StudyResults, answer: Answer) -> tuple[Point, ...]:
     """Return the value of each line of the answer; `published` is the threshold of each."""
-    return tuple(
-        _point(results, line.verdict, "", line.verdict.compared.threshold) for line in answer.lines
-    )
+    points = []
+    for line in answer.lines:
+        value, low, high = line.estimate or (None, None, None)
+        point = _point(results, line.verdict, "", line.threshold)
+        points.append(point._replace(value=value, low=low, high=high))
+    return tuple(points)
 
 
-def forest_figure(results: StudyResults, answer: Answer, points: Sequence[Point]) -> Figure:
-    """Return the lines of the answer as a forest of intervals, below the names of indicators.
+def forest_figures(
+    results: StudyResults, answer: Answer, points: Sequence[Point]
+) -> Iterator[Figure]:
+    """Yield P in times that of another policy, and the indicators, as forests of intervals.
 
     Where there are several policies or tasks, those with the same question share its row.
     """
-    groups = answer.lines_by_subject
-    # What stands between two policies has the colour of neither.
-    subjects = sorted(groups, key=lambda subject: groups[subject][0].verdict.compares_policies)
-    by_indicator: dict[str, dict[str, list[Point]]] = {}
-    for line, point in zip(answer.lines, points):
+    pairs = [*zip(answer.lines, points)]
+    of_policies = [(line, point) for line, point in pairs if line.verdict.compares_policies]
+    of_indicators = [(line, point) for line, point in pairs if not line.verdict.compares_policies]
+    if of_policies:
+        label = "times P of the policy behind 'against' (logarithmic)"
+        name = "times" if of_indicators else "answer"
+        yield _forest_figure(name, label, results, answer, of_policies, is_of_times=True)
+    if of_indicators:
+        label = "value of the indicator"
+        yield _forest_figure("answer", label, results, answer, of_indicators)
+
+
+def _forest_figure(
+    name: str,
+    x_label: str,
+    results: StudyResults,
+    answer: Answer,
+    pairs: Sequence[tuple[Line, Point]],
+    *,
+    is_of_times: bool = False,
+) -> Figure:
+    subjects = list(dict.fromkeys(line.subject for line, _ in pairs))
+    by_heading: dict[str, dict[str, list[Point]]] = {}
+    for line, point in pairs:
         of_subject = point._replace(series=line.subject, style=subjects.index(line.subject))
-        rows_of = by_indicator.setdefault(line.verdict.compared.definition.heading, {})
-        compares = line.verdict.compares_policies
-        label = line.question if compares else line.name(with_subject=False)
-        rows_of.setdefault(label, []).append(of_subject)
+        heading = "" if is_of_times else line.heading
+        label = line.name(with_subject=False).removeprefix("P, ")
+        by_heading.setdefault(heading, {}).setdefault(label, []).append(of_subject)
     rows: list[tuple[str, list[Point]]] = []
-    for heading, rows_of in by_indicator.items():
-        rows += [(f"{heading[0].upper()}{heading[1:]}", []), *rows_of.items()]
-    verdicts = [line.verdict for line in answer.lines]
+    for heading, rows_of in by_heading.items():
+        rows += [(heading, [])] if heading else []
+        rows += rows_of.items()
+    verdicts = [line.verdict for line, _ in pairs]
+    zeros = "" if is_of_times else "".join(f" {zero}." for zero in zeros_of(verdicts))
     # Where there are several, the legend names them.
-    title = results.policies[0] if len(subjects) == 1 else ""
+    title = subjects[0] if len(subjects) == 1 else ""
     return Figure(
-        "answer",
+        name,
         f"{answer.scope} Every question with its interval.",
         _rows(results, verdicts),
         0.9 + sum(max(0.2, 0.05 + 0.1 * len(of_row)) for _, of_row in rows),
-        partial(drawing.forest, columns={"value of the indicator": rows}, title=title),
-        note_on_verdicts(results, verdicts),
+        partial(drawing.forest, columns={x_label: rows}, title=title, is_of_times=is_of_times),
+        f"{note_on_verdicts(results, verdicts)}{zeros}",
     )
 
 
@@ -295,7 +321,7 @@ def note_on_verdicts(results: StudyResults, verdicts: Sequence[Verdict]) -> str:
     """Return what the marks of verdicts mean, and over which seeds they are."""
     caps = f" {CAPPED}" if any(verdict.saturated for verdict in verdicts) else ""
     points = [_point(results, verdict, "", None) for verdict in verdicts]
-    cut = ", without an end where they leave the axis" if cuts_intervals(points) else ""
+    cut = ", with an arrow where they leave the axis" if cuts_intervals(points) else ""
     return (
         f"{results.seeds_text.capitalize()}. Bars: {levels(verdicts)} intervals{cut}; filled: "
         "decided by Holm's method; hollow: open, even where the bar lies beside a threshold; "

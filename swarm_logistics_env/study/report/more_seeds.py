@@ -16,7 +16,7 @@ _MOST_NAMED = 3  # questions
 # What questions need, by the case that applies to them.
 _NEEDS = {
     "within_reach": "{count} open: {n_seeds} new {runs} might decide them",
-    "beyond": "{count} open need more than {reach} {runs} ({named})",
+    "beyond": "{count} open, for which {reach} {runs} are too few ({named})",
     "none": "{count} open: no number in reach will do ({named})",
     "small": f"{{count}} open of an effect below {EFFECT:g}, for which more are not worth while",
 }

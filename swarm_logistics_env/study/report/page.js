@@ -54,6 +54,13 @@ function titleDots() {
   }
 }
 
+// On a phone the words are folded and decided questions stand first, if there are some.
+if (matchMedia("(max-width: 40rem)").matches) {
+  document.querySelector(".words").open = false;
+  const only = document.querySelector(".questions input");
+  if (only) only.checked = document.querySelector(".questions td.word:not(.open)") !== null;
+}
+
 // One question: paired slopes, delivery curves, and one run
 
 let chosen = { question: null, arms: [], seed: 0 };

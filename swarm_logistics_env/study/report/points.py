@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+_MARGIN_OF_TIMES = 1.15
 _FAR = 5.0  # an indicator from which on axes are linear up to 1 alone, and logarithmic beyond
 
 
@@ -59,6 +60,15 @@ def axis_limits(points: Sequence[Point]) -> tuple[float, float]:
     high = min(max(ends), max(values) + reach)
     margin = 0.06 * max(high - low, 0.5)
     return low - margin, high + margin
+
+
+def times_limits(points: Sequence[Point]) -> tuple[float, float]:
+    """Return limits of a logarithmic axis of factors: 1, all values, and intervals to 5 times."""
+    values = [1.0, *(point.value for point in points if point.value and point.value > 0.0)]
+    ends = [end for point in points for end in (point.low, point.high) if end is not None]
+    low = max(min([*values, *(end for end in ends if end > 0.0)]), min(values) / _FAR)
+    high = min(max([*values, *ends]), max(values) * _FAR)
+    return low / _MARGIN_OF_TIMES, high * _MARGIN_OF_TIMES
 
 
 def cuts_intervals(points: Sequence[Point]) -> bool:

@@ -112,7 +112,7 @@ class _Compared(NamedTuple):
                 f"P of {first} and of {second} cannot be compared: {self.main.problem} "
                 f"({condition})"
             )
-        times = f"{section.bracketed(_factor(self.main.interval), 2, [1.0])} times"
+        times = f"{section.bracketed(factor_of(self.main.interval), 2, [1.0])} times"
         level = section.percent(self.main.level or CONFIDENCE)
         if level != section.P_LEVEL:
             condition += f", {level}"
@@ -130,7 +130,7 @@ class _Compared(NamedTuple):
         """The factor of the other policy to the first one, and whether it is decided."""
         times = section.NOTHING
         if self.main.interval is not None:
-            times = section.bracketed(_inverse(_factor(self.main.interval)), 2, [1.0])
+            times = section.bracketed(_inverse(factor_of(self.main.interval)), 2, [1.0])
         words = {"supported": "less", "refuted": "more"}
         word = self.main.on_threshold.adjusted
         return times, words.get(word, self.main.in_words)
@@ -151,7 +151,7 @@ class _Compared(NamedTuple):
             word = "more" if self.is_ahead else "less"
             text += f"; also {word} in {n_same} of {len(self.elsewhere)} other conditions"
             of_alike = [v.interval for v in self.elsewhere if v.on_threshold.adjusted == alike]
-            values = [_factor(change).value for change in of_alike if change]
+            values = [factor_of(change).value for change in of_alike if change]
             least = section.fixed(min(values), 2, [1.0])
             most = section.fixed(max(values), 2, [1.0])
             if least != most:
@@ -175,7 +175,7 @@ class _Compared(NamedTuple):
         )
 
 
-def _factor(change: Interval) -> Interval:
+def factor_of(change: Interval) -> Interval:
     """Return a relative change as a factor of P."""
     low, high = (None if end is None else 1.0 + end for end in (change.low, change.high))
     return Interval(1.0 + change.value, low, high)

@@ -116,7 +116,9 @@ def test_a_row_that_is_open_beside_its_interval_says_why_in_a_paper_too() -> Non
     latex = latex_tables(document(few).paper)
     (row,) = rows_of(latex, "tab:homing-indicators")
     assert row.endswith("open, stalls \\\\")
-    assert "open: neither an effect is shown nor that there is none; stalls: " in latex
+    assert (
+        "open: neither an effect is shown nor that there is none; write neither; stalls: " in latex
+    )
     words = "FM1, 2 of 25: P 41.2→34.7, R -0.08 [-0.12, -0.03], open, stalls. "
     assert words in in_a_sentence(few, answer(few))
     assert "xploratory" not in latex + in_a_sentence(few, answer(few))
@@ -142,8 +144,9 @@ def test_no_table_of_a_judged_policy_is_wider_than_the_page(tmp_path: Path) -> N
 
     results = judged(study, play)  # type: ignore[arg-type]
     latex = latex_tables(document(results).paper)
-    # Behind an interval of another level than the heading has.
-    assert re.search(r"\] ?\S* \$9[\d.]+\$\\,\\% & (supported|refuted|open)", latex)
+    # A letter stands behind an interval of another level than the heading has.
+    assert re.search(r"\] ?\S* a & (supported|refuted|open)", latex)
+    assert re.search(r"; a: interval of \$?9[\d.]+\$?\\,\\%", latex)
     for page in PAGES:
         assert "Overfull" not in compiled(latex, page, tmp_path)
 

@@ -14,7 +14,9 @@ from tests.made_up import delivered, judged
 def test_p_of_no_delivery_has_the_limit_of_its_runs() -> None:
     study = Study(seeds=4, sizes=[{"values": [2, 3]}])
     nothing = judged(study, lambda *_: delivered(0))
-    assert "= 0 (at most 0.75 at 95 %, as none of 4 runs delivered" in answer(nothing).head[0]
+    assert "= 0 (at most 0.75 at 95 %, as none of 4 runs delivered" in " ".join(
+        answer(nothing).head
+    )
 
 
 def test_p_of_a_policy_is_that_of_its_first_table() -> None:
@@ -24,7 +26,7 @@ def test_p_of_a_policy_is_that_of_its_first_table() -> None:
         (run.case.key, run.seed): delivered(run.case.scenario.n_items + run.seed)  # type: ignore[attr-defined]
         for run in plan.runs
     }
-    assert " = 50.5 [" in answer(judge(plan, outcomes)).head[0]
+    assert " = 50.5 [" in " ".join(answer(judge(plan, outcomes)).head)
 
 
 def test_a_study_that_compares_policies_alone_says_p_of_each_in_its_first_table() -> None:

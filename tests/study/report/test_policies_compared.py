@@ -55,23 +55,28 @@ def test_the_first_line_has_the_direction_of_the_rows() -> None:
     assert words.startswith("P of swarm-dt is 0.50 [0.50, 0.50] times that of homing (N = 25); ")
     assert "; also less in 1 of 3 other conditions; the other way round: FM4 m = 3;" in words
     row = next(line for line in answer(results).lines if "N = 25" in line.question)
-    assert (row.question, row.value) == ("P of swarm-dt, N = 25", "-0.50")
+    # As the sentence has it.
+    assert (row.question, row.value) == ("times P, N = 25", "0.50")
 
 
 def test_policies_share_the_row_of_a_question_in_the_figure_and_the_legend_names_them() -> None:
     results = judged(study_of("homing", "swarm-dt", indicators=["R"]), play)
-    figure = next(figure for figure in document(results).figures if figure.name == "answer")
-    canvas = Canvas()
-    figure.draw(canvas)
+    drawn = {figure.name: Canvas() for figure in document(results).figures}
+    for figure in document(results).figures:
+        figure.draw(drawn[figure.name])
+    (axes,) = drawn["times"].axes
+    conditions = [tick.get_text() for tick in axes.get_yticklabels()]
+    assert axes.get_xscale() == "log"
+    canvas = drawn["answer"]
     (axes,) = canvas.axes
     labels = [tick.get_text() for tick in axes.get_yticklabels()]
     of_both = ["FM1, 1 of 25", "FM1, 3 of 25", "FM4, 1 of 25", "FM4, 3 of 25"]
     assert labels[-5:] == ["Robustness R", *of_both]
-    # Two headings stand among the labels.
-    assert len(answer(results).lines) == len(labels) - 2 + 4
-    assert [label.get_fontweight() for label in axes.get_yticklabels()].count("bold") == 2
+    # A heading stands among the labels.
+    assert len(answer(results).lines) == len(conditions) + 2 * (len(labels) - 1)
+    assert [label.get_fontweight() for label in axes.get_yticklabels()].count("bold") == 1
     (legend,) = canvas.legends
-    names = ["homing against swarm-dt", "homing", "swarm-dt"]
+    names = ["homing", "swarm-dt"]
     assert [text.get_text() for text in legend.get_texts()] == names
 
 
@@ -107,7 +112,9 @@ def test_nothing_is_compared_unless_it_is_asked_for() -> None:
     study = Study(policies=["homing", "swarm-dt"], seeds=3, sizes=[SIZES])
     results: StudyResults = judged(study, play)
     assert answer(results).comparison == ""
-    assert terminal_answer(answer(results), 80).startswith("study: ")
+    first, second, *_ = terminal_answer(answer(results), 80).splitlines()
+    assert first == "None of 2 questions is decided."
+    assert second.startswith("study: ")
     assert "policies" not in [figure.name for figure in document(results).figures]
 
 

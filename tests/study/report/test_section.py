@@ -97,16 +97,23 @@ def test_every_surface_names_the_level_that_it_prints(
     assert heading in surfaces["report"]
     assert f">value [{most}]<" in page
     assert re.search(rf"{most} interval +verdict", surfaces["terminal"])
+    letters = dict(re.findall(r"^([a-z]): interval of (.+)\.$", surfaces["terminal"], re.MULTILINE))
     for question, level in level_by_question.items():
         (row,) = re.findall(rf"^{question}, .*$", surfaces["terminal"], re.MULTILINE)
-        own = "" if level == most else f" {level}"
+        own = ""
+        if level != most:
+            (letter,) = [letter for letter, other in letters.items() if other == level]
+            own = f" {letter}"
+            assert f"{letter}: interval of {level}" in tex
         assert re.search(rf"\]{own}  +\w", row)
         assert f", {level} interval [" in surfaces["report"]
         assert re.search(
             rf"^\| {question}, 1 of 25 \| .*\]{own} \|", surfaces["report"], re.MULTILINE
         )
         assert re.search(rf"\| {question[2:]}, m = 1 \|.*\| {level} \|", surfaces["report"])
-        assert re.search(rf'{question}, 1 of 25</th><td class="number">.*\]{own}</td>', page)
+        indicator, _, fault = question.partition(" ")
+        part = page.split(f">Robustness {indicator}</th>")[1]
+        assert re.search(rf'{fault}, 1 of 25</th><td class="number">.*\]{own}</td>', part)
         assert re.search(rf"^{question}, 1 of 25 & .*\]{own}.? & ", tex, re.MULTILINE)
     assert f"{levels(stopped.verdicts)} intervals" in surfaces["figures"]
     worst = f", R -0.55 [-0.67, -0.37] at {level_by_question['R FM4']}, refuted"
