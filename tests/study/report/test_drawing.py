@@ -133,3 +133,24 @@ def test_a_run_of_0_has_its_dot_where_the_others_are_far_apart() -> None:
         svg = drawing.svg_image(lambda canvas: drawing.intervals(canvas, [panel]), 3.0)
     (dots,) = ElementTree.fromstring(svg).iterfind(".//*[@id='a-seeds-0-1']")
     assert len(list(dots.iterfind(".//{*}use"))) == 2
+
+
+def test_the_dots_of_runs_spread_to_both_sides_of_the_mean() -> None:
+    runs = tuple(float(seed) for seed in range(40))
+    canvas = Figure()
+    drawing.intervals(canvas, [Panel("", "", (POINT._replace(runs=runs),), (), "")])
+    dots = canvas.axes[0].collections[0].get_offsets()
+    x = np.asarray(dots)[:, 0]
+    assert x.mean() == pytest.approx(0.0, abs=0.02)
+    assert x.min() == pytest.approx(-x.max(), abs=0.02)
+    assert x.max() > 0.05
+
+
+def test_an_interval_that_leaves_the_axis_ends_in_an_arrow() -> None:
+    points = (POINT._replace(value=0.1, low=-10.0, high=30.0), POINT._replace(category="N = 6"))
+    canvas = Figure()
+    drawing.forest(canvas, {"S": [("N = 5", [points[0]]), ("N = 6", [points[1]])]})
+    (axes,) = canvas.axes
+    arrows = {line.get_marker(): line.get_xydata().tolist() for line in axes.lines}
+    low, high = axes.get_xlim()
+    assert (arrows["<"], arrows[">"]) == ([[low, 0.0]], [[high, 0.0]])

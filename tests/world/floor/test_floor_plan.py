@@ -204,3 +204,8 @@ def test_boxes_cover_the_solid_cells_once(data: st.DataObject, rows: int, column
     for left, bottom, right, top in merged_boxes(is_solid):
         covered[bottom:top, left:right] += 1
     assert (covered == is_solid).all()
+
+
+def test_a_way_that_is_wider_than_half_a_robot_and_narrower_than_it_is_refused() -> None:
+    with pytest.raises(ScenarioError, match="the way from this storage to a dock is narrower"):
+        Scenario(floor="A:#:/A:.:", cell_size=0.2, n_robots=1, n_items=1)  # of 0.25 m

@@ -264,3 +264,20 @@ def test_requests_name_docks_only_where_there_are_two() -> None:
     for floor in (None, "aisles"):
         with pytest.raises(ScenarioError, match="should have a floor of two docks or more"):
             Scenario(floor=floor, request_docks="random")
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "step_x", "step_y", "distance"),
+    [
+        (0.4, 1.25, 1, 0, 0.6),
+        (1.9, 1.25, -1, 0, 0.4),
+        (1.25, 0.4, 0, 1, 0.6),
+        (1.25, 1.9, 0, -1, 0.4),
+    ],
+)
+def test_a_ray_along_an_axis_meets_the_rack_in_its_way(
+    x: float, y: float, step_x: float, step_y: float, distance: float
+) -> None:
+    words = packed(floor_of(Scenario(floor=WALLED, n_robots=1, n_items=1)))
+    ray = free_way_at(words.ctypes.data, x, y, float(step_x), float(step_y), 5.0)
+    assert ray == pytest.approx(distance)
