@@ -139,7 +139,7 @@ def test_the_dots_of_runs_spread_to_both_sides_of_the_mean() -> None:
     runs = tuple(float(seed) for seed in range(40))
     canvas = Figure()
     drawing.intervals(canvas, [Panel("", "", (POINT._replace(runs=runs),), (), "")])
-    dots = canvas.axes[0].collections[0].get_offsets()
+    dots: Any = canvas.axes[0].collections[0].get_offsets()
     x = np.asarray(dots)[:, 0]
     assert x.mean() == pytest.approx(0.0, abs=0.02)
     assert x.min() == pytest.approx(-x.max(), abs=0.02)
@@ -151,6 +151,6 @@ def test_an_interval_that_leaves_the_axis_ends_in_an_arrow() -> None:
     canvas = Figure()
     drawing.forest(canvas, {"S": [("N = 5", [points[0]]), ("N = 6", [points[1]])]})
     (axes,) = canvas.axes
-    arrows = {line.get_marker(): line.get_xydata().tolist() for line in axes.lines}
+    arrows = {line.get_marker(): np.asarray(line.get_xydata()).tolist() for line in axes.lines}
     low, high = axes.get_xlim()
     assert (arrows["<"], arrows[">"]) == ([[low, 0.0]], [[high, 0.0]])
