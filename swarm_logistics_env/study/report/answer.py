@@ -190,7 +190,12 @@ class Answer(NamedTuple):
 
     def interval(self, line: Line) -> str:
         """Return the interval of a line, with a letter if its level is none that most have."""
-        return f"{line.interval} {letters_of(self.lines, self.level).get(line.level, '')}".strip()
+        return f"{line.interval} {self.letters.get(line.level, '')}".strip()
+
+    @property
+    def letters(self) -> dict[str, str]:
+        """A letter for each level of an interval that is none that most have."""
+        return _letters(self.lines, self.level)
 
     @property
     def section(self) -> Section:
@@ -206,7 +211,7 @@ def answer(results: StudyResults) -> Answer:
     performance_of = performances(results)
     lines = list(_lines(results))
     level = _common_level(lines)
-    letters = letters_of(lines, level)
+    letters = _letters(lines, level)
     of_levels = [f"{letter}: interval of {other}." for other, letter in letters.items()]
     subjects = tuple(
         SubjectAnswer(
@@ -247,7 +252,7 @@ def _common_level(lines: Sequence[Line]) -> str:
     return levels.most_common(1)[0][0] if levels else section.P_LEVEL
 
 
-def letters_of(lines: Sequence[Line], level: str) -> dict[str, str]:
+def _letters(lines: Sequence[Line], level: str) -> dict[str, str]:
     """Return a letter for each level of an interval that is none that most have."""
     levels = dict.fromkeys(line.level for line in lines if line.level not in ("", level))
     return {other: chr(ord("a") + number) for number, other in enumerate(levels)}

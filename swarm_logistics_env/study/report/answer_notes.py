@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from .more_seeds import more_seeds
 
 _FEW_ITEMS = 1.0  # in a run, of which shares say little
 _MOST_CONDITIONS = 2  # that a note of the answer names
-_TIMES = "times P: of the first policy in times that of the other"
 # What the words of verdicts mean: those that stand in an answer, in this order.
 _MEANINGS = {
     "decided": "supported: above 0; refuted: below 0",
@@ -105,16 +104,7 @@ def meanings(verdicts: Sequence[Verdict]) -> list[str]:
     of_words = (
         meaning.format(margin=margin) for word, meaning in _MEANINGS.items() if word in words
     )
-    return [*zeros_of(verdicts), *of_words]
-
-
-def zeros_of(verdicts: Iterable[Verdict]) -> list[str]:
-    """Return what each indicator of these verdicts is, and what 0 means."""
-    zeros = (
-        _TIMES if verdict.compares_policies else verdict.compared.definition.at_zero
-        for verdict in verdicts
-    )
-    return [*dict.fromkeys(zeros)]
+    return [*dict.fromkeys(verdict.at_zero for verdict in verdicts), *of_words]
 
 
 def _notes_that_apply(results: StudyResults) -> Iterator[str]:

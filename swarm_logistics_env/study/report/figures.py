@@ -19,7 +19,6 @@ from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
 
 from . import drawing
 from .answer import Answer, Line
-from .answer_notes import zeros_of
 from .points import Panel, Point, cuts_intervals
 from .section import P_LEVEL, Figure, join_names, levels, slug
 
@@ -82,7 +81,7 @@ def _forest_figure(
         rows += [(heading, [])] if heading else []
         rows += rows_of.items()
     verdicts = [line.verdict for line, _ in pairs]
-    zeros = "" if is_of_times else "".join(f" {zero}." for zero in zeros_of(verdicts))
+    zeros = dict.fromkeys(f" {verdict.at_zero}." for verdict in verdicts)
     # Where there are several, the legend names them.
     title = subjects[0] if len(subjects) == 1 else ""
     return Figure(
@@ -91,7 +90,7 @@ def _forest_figure(
         _rows(results, verdicts),
         0.9 + sum(max(0.2, 0.05 + 0.1 * len(of_row)) for _, of_row in rows),
         partial(drawing.forest, columns={x_label: rows}, title=title, is_of_times=is_of_times),
-        f"{note_on_verdicts(results, verdicts)}{zeros}",
+        note_on_verdicts(results, verdicts) + "".join(zeros),
     )
 
 

@@ -14,7 +14,7 @@ from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.until_clear import HARDLY
 
 from . import section
-from .answer import Answer, letters_of
+from .answer import Answer
 from .answer_notes import meanings
 from .figures import parameter_label
 from .section import Section
@@ -69,8 +69,11 @@ def _answer_tables(answer: Answer) -> Iterator[Section]:
         names = [DEFINITIONS[symbol].heading for symbol in DEFINITIONS if symbol in symbols]
         text = section.join_names(names)
         levels = {line.level for line in lines}
-        letters = letters_of(answer.lines, answer.level)
-        of_levels = [f"{letter}: interval of {x}" for x, letter in letters.items() if x in levels]
+        of_levels = [
+            f"{letter}: interval of {level}"
+            for level, letter in answer.letters.items()
+            if level in levels
+        ]
         words = "; ".join([*meanings([line.verdict for line in lines]), *of_levels])
         captions = (performances.get(subject, ""), text, words)
         sentences = tuple(f"{text[0].upper()}{text[1:]}." for text in captions if text)

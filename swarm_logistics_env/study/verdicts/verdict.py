@@ -237,6 +237,13 @@ class Verdict:
         return self.compared.definition.compares == "policy" and self.compared.claim is None
 
     @property
+    def at_zero(self) -> str:
+        """What a report says of its value, and of a value of 0."""
+        if self.compares_policies:
+            return "times P: of the first policy in times that of the other"
+        return self.compared.definition.at_zero
+
+    @property
     def equivalence_name(self) -> str | None:
         """What is tested for equivalence, e.g. "P_F within 10 % of P_o"; None: nothing."""
         return self.compared.definition.unchanged(self.margin)
