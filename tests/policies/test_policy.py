@@ -45,8 +45,9 @@ def commands_of(policy: Any) -> Any:
     rows[:, 0, [observations.CARRYING, observations.CARRYING_REQUESTED]] = 1.0
     rows[:, 0, observations.IN_DELIVERY_AREA] = 0.0  # for 17 s: it may lose its patience
     commands = []
-    for handling_time in (0.0, 1.0):  # a stock has a parameter for either
-        policy.configure(Scenario(handling_time=handling_time, n_items=12))
+    # A stock has a parameter for either handling time, and lengths may go with the radius.
+    for handling_time, radius in ((0.0, 0.125), (1.0, 0.1)):
+        policy.configure(Scenario(handling_time=handling_time, robot_radius=radius, n_items=12))
         policy.reset(80, 0)
         commands += [policy.act(step) for step in rows for _ in range(10)]
     return np.array(commands)

@@ -14,6 +14,7 @@ from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import (
     DECIDED,
     UNAFFECTED,
+    UNDEFINED,
     UNTESTABLE,
     Verdict,
 )
@@ -147,7 +148,7 @@ class Answer(NamedTuple):
         """The sentences before the overview: what is compared, and how much was asked."""
         sentences = [self.comparison] if self.comparison else []
         words = {line.verdict.on_property.adjusted for line in self.lines}
-        if len(self.lines) > 1 and not words & {*DECIDED}:
+        if len(self.lines) > 1 and not words & {*DECIDED, UNDEFINED}:
             sentences.insert(0, f"None of {len(self.lines)} questions is decided.")
         return sentences if len(self.subjects) == 1 else [*sentences, self.scope]
 
