@@ -190,8 +190,8 @@ def search(script: str, path: Path, is_over: Callable[[], bool]) -> dict[str, fl
     return values_at(script, strategy.result.xfavorite)
 
 
-def confirm(script: str, values: Values, first: int) -> dict[str, Interval]:
-    """Return ln(P / P of the shipped set): in each world, and in the mean of all.
+def confirm(script: str, values: Values, before: Values, first: int) -> dict[str, Interval]:
+    """Return ln(P / P of the set before): in each world, and in the mean of all.
 
     Args:
         first: of the seeds, which are fresh.
@@ -200,7 +200,7 @@ def confirm(script: str, values: Values, first: int) -> dict[str, Interval]:
     with ProcessPoolExecutor(usable_cores()) as processes:
         new, old = (
             list(processes.map(partial(play, script, values=chosen), seeds))
-            for chosen in (values, shipped(script))
+            for chosen in (values, before)
         )
     gains = np.array(
         [
@@ -253,7 +253,7 @@ def main(
         sets = {"shipped": shipped(script), "searched": values}
         rows = [(name, *chosen.values()) for name, chosen in sets.items()]
         write_rows(out / f"{script}-values.csv", ("set", *values), rows)
-        gains = confirm(script, values, FIRST_SEEDS[script] + 5_000)
+        gains = confirm(script, values, shipped(script), FIRST_SEEDS[script] + 5_000)
         gain_rows = [(world, *interval) for world, interval in gains.items()]
         write_rows(out / f"{script}-confirmed.csv", ("world", *ENDS), gain_rows)
         print(script, values, {world: section.bracketed(g, 2) for world, g in gains.items()})

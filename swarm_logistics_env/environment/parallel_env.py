@@ -83,9 +83,10 @@ class SwarmLogisticsEnv(DictView):
         **fields: Any,
     ) -> None:
         self.scenario = _scenario_of(scenario, fields)
-        n_possible = self.scenario.n_robots
+        largest = self.scenario
         if max_robots is not None:
-            n_possible = checked_count("max_robots", max_robots, n_possible)
+            most = checked_count("max_robots", max_robots, largest.n_robots)
+            largest = largest.replace(n_robots=most)
         self.faults = checked_faults("faults", faults, SetupError)
         self.max_cycles = None if max_cycles is None else checked_count("max_cycles", max_cycles)
         modes = self.metadata["render_modes"]
@@ -97,8 +98,9 @@ class SwarmLogisticsEnv(DictView):
         self.warehouse = Warehouse(self.scenario)
         self.agents: list[str] = []
         self.is_begun = False
-        self.possible_agents = agent_names(range(n_possible))
+        self.possible_agents = agent_names(range(largest.n_robots))
         self._spaces = Spaces(self.scenario)
+        self._spaces.declared.add(largest)
         self._rewards = RewardTerms(rewards)
         self.next_seed = int(np.random.default_rng().integers(2**63))
         self.max_robots = max_robots
@@ -289,9 +291,9 @@ class SwarmLogisticsEnv(DictView):
             SetupError: the rows or commands of `scenario` have another length than this
                 environment's.
         """
-        if scenario.n_robots > len(self.possible_agents):
-            self.possible_agents = agent_names(range(scenario.n_robots))
+        names = agent_names(range(max(len(self.possible_agents), scenario.n_robots)))
         self._spaces.widen(scenario)
+        self.possible_agents = names
 
     @in_one_thread
     def render(self) -> NDArray[np.uint8] | None:

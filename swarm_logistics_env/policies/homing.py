@@ -167,7 +167,7 @@ class Homing(RowPolicy, Scripted):
         self.fit_to(scenario)
 
     def fit_to(self, swarm: Scenario) -> None:
-        """Take how large robots are."""
+        """Take how large the largest robots are."""
         self._values = self.parameters.scaled_to(swarm).values()
 
     def begin(self, keys: NDArray[np.uint64]) -> None:

@@ -108,12 +108,16 @@ class ScriptParameters(Record):
         return tuple(dict(self).values())
 
     def scaled_to(self, swarm: Scenario) -> Self:
-        """Return these with lengths as much larger as these robots are than those of the fit."""
+        """Return these with lengths as much larger as these robots are than those of the fit.
+
+        Lengths that were published stay.
+        """
         scale = swarm.robot_radius / FITTED_RADIUS
         lengths = {
             name: scale * getattr(self, name)
             for name, field in type(self).model_fields.items()
             if field.description and "[m]" in field.description
+            if "source" not in field.description
         }
         return self.model_copy(update=lengths)
 

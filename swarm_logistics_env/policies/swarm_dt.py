@@ -161,7 +161,7 @@ class SwarmDT(RowPolicy, Scripted):
         self.fit_to(scenario)
 
     def fit_to(self, swarm: Scenario) -> None:
-        """Take how large robots are, if the lengths go with it."""
+        """Take how large the largest robots are, if the lengths go with it."""
         scales = self.parameters.scales
         parameters = self.parameters.scaled_to(swarm) if scales else self.parameters
         self._values = parameters.values()

@@ -264,8 +264,8 @@ DEFINITIONS: dict[str, Definition] = {
             function=robustness,
             arguments=lambda c: {"n": c.n_robots, "m": int(c.after)},
             adjectives={0.0: "robust"},
-            at_zero="R = P with m of N faulty / P of all sound - (1 - m/N); 0: P falls by m/N, "
-            "m/N: not at all",
+            at_zero="R = P with m of N faulty / P of all sound - (1 - m/N); 0: P falls by the "
+            "share m/N, m/N: not at all",
         ),
         Definition(
             symbol="A",

@@ -33,7 +33,7 @@ def imitate(training: Training, learner: Any, log: Any, rng: np.random.Generator
 
     Args:
         log: its `seconds` and `cpu_seconds` go on.
-        rng: what is drawn meanwhile.
+        rng: draws batches, noise, and which robots do what the teacher says.
 
     Raises:
         FloatingPointError: the loss, an observation or a reward is not finite.

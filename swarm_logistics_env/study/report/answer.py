@@ -12,9 +12,7 @@ from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import (
-    DECIDED,
     UNAFFECTED,
-    UNDEFINED,
     UNTESTABLE,
     Verdict,
 )
@@ -47,8 +45,8 @@ class Line(NamedTuple):
     p: str = ""
 
     def name(self, *, with_subject: bool) -> str:
-        """Return the question without its indicator, perhaps with whose swarm it is about."""
-        name = self.question.partition(" ")[2]
+        """Return the question without what is compared, perhaps with whose swarm it is about."""
+        name = self.question.partition(" ")[2].removeprefix("P, ")
         return f"{self.subject}: {name}" if with_subject else name
 
     @property
@@ -129,7 +127,7 @@ class Answer(NamedTuple):
         lines: the questions.
         notes: what the words of the verdicts mean, and what is still open, a line each.
         seeds: over which everything is.
-        level: of the intervals, as a heading says; a line with another one says its own.
+        level: of the intervals, as a heading says; a line with another one has a letter.
     """
 
     title: str
@@ -147,8 +145,8 @@ class Answer(NamedTuple):
     def opening(self) -> list[str]:
         """The sentences before the overview: what is compared, and how much was asked."""
         sentences = [self.comparison] if self.comparison else []
-        words = {line.verdict.on_property.adjusted for line in self.lines}
-        if len(self.lines) > 1 and not words & {*DECIDED, UNDEFINED}:
+        words = {line.verdict.conclusion for line in self.lines}
+        if len(self.lines) > 1 and words <= {"open", UNTESTABLE}:
             sentences.insert(0, f"None of {len(self.lines)} questions is decided.")
         return sentences if len(self.subjects) == 1 else [*sentences, self.scope]
 

@@ -23,7 +23,7 @@ _MEANINGS = {
     "decided": "supported: above 0; refuted: below 0",
     "compared": "more, less: of P than the policy behind 'against'",
     "open": "open: neither an effect is shown nor that there is none; write neither",
-    "margin": "< {margin}: P is shown to differ by less than that share of P of the sound swarm",
+    "margin": "< {margin}: P is shown to differ by less, as a share of what it is compared with",
     "stalls": "stalls: one run that stalls, unseen so far, could turn it",
     "trainings": "trainings: one that collapses, unseen so far, could turn it",
     "Holm": "Holm: clear as the only question, not among all on the indicator",

@@ -104,7 +104,7 @@ def document(results: StudyResults) -> Document:
     tables = tuple(cell_tables(results))
     paper_sections = tuple(cell_tables(results, for_paper=True))
     further = tuple(further_tables(results))
-    how = Section("", lines=(methods(plan, results.looks),))
+    methods_section = Section("", lines=(methods(plan, results.looks),))
     set_up = setup_sheet(plan)
     chapters = [
         Chapter("Warnings", "", (Section("Warnings", lines=lines),) if lines else ()),
@@ -132,7 +132,7 @@ def document(results: StudyResults) -> Document:
             (*trade_off, *of_faults),
         ),
         Chapter("Set-up", "", set_up),
-        Chapter("Methods", "", (how,)),
+        Chapter("Methods", "", (methods_section,)),
     ]
     report = Document(
         text,

@@ -74,7 +74,7 @@ def _forest_figure(
     for line, point in pairs:
         of_subject = point._replace(series=line.subject, style=subjects.index(line.subject))
         heading = "" if is_of_times else line.heading
-        label = line.name(with_subject=False).removeprefix("P, ")
+        label = line.name(with_subject=False)
         by_heading.setdefault(heading, {}).setdefault(label, []).append(of_subject)
     rows: list[tuple[str, list[Point]]] = []
     for heading, rows_of in by_heading.items():
@@ -90,7 +90,8 @@ def _forest_figure(
         _rows(results, verdicts),
         0.9 + sum(max(0.2, 0.05 + 0.1 * len(of_row)) for _, of_row in rows),
         partial(drawing.forest, columns={x_label: rows}, title=title, is_of_times=is_of_times),
-        note_on_verdicts(results, verdicts) + "".join(zeros),
+        _note(results, verdicts, [point for _, point in pairs], is_of_times=is_of_times)
+        + "".join(zeros),
     )
 
 
@@ -318,9 +319,19 @@ CAPPED = "†: P is capped, every item was delivered in a run."
 
 def note_on_verdicts(results: StudyResults, verdicts: Sequence[Verdict]) -> str:
     """Return what the marks of verdicts mean, and over which seeds they are."""
+    return _note(results, verdicts, [_point(results, verdict, "", None) for verdict in verdicts])
+
+
+def _note(
+    results: StudyResults,
+    verdicts: Sequence[Verdict],
+    points: Sequence[Point],
+    *,
+    is_of_times: bool = False,
+) -> str:
     caps = f" {CAPPED}" if any(verdict.saturated for verdict in verdicts) else ""
-    points = [_point(results, verdict, "", None) for verdict in verdicts]
-    cut = ", with an arrow where they leave the axis" if cuts_intervals(points) else ""
+    leaves = cuts_intervals(points, is_of_times=is_of_times)
+    cut = ", with an arrow where they leave the axis" if leaves else ""
     return (
         f"{results.seeds_text.capitalize()}. Bars: {levels(verdicts)} intervals{cut}; filled: "
         "decided by Holm's method; hollow: open, even where the bar lies beside a threshold; "

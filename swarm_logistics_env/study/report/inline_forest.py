@@ -65,7 +65,7 @@ def groups_of(answer: Answer, points: Sequence[Point]) -> tuple[Group, ...]:
     for heading, alike in by_heading.items():
         axis = of_factors if alike[0][0].verdict.compares_policies else of_indicators
         rows = [
-            Row(line, line.name(with_subject=False).removeprefix("P, "), _row(axis, point, line))
+            Row(line, line.name(with_subject=False), _row(axis, point, line))
             for line, point in alike
         ]
         groups.append(Group(heading, _numbers(axis), tuple(rows)))

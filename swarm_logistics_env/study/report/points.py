@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-_MARGIN_OF_TIMES = 1.15
+_MARGIN_OF_TIMES = 1.15  # of a logarithmic axis of factors, to both sides
 _FAR = 5.0  # an indicator from which on axes are linear up to 1 alone, and logarithmic beyond
 
 
@@ -71,9 +71,9 @@ def times_limits(points: Sequence[Point]) -> tuple[float, float]:
     return low / _MARGIN_OF_TIMES, high * _MARGIN_OF_TIMES
 
 
-def cuts_intervals(points: Sequence[Point]) -> bool:
+def cuts_intervals(points: Sequence[Point], *, is_of_times: bool = False) -> bool:
     """Return whether an interval ends beyond the axis that shows these values."""
-    low, high = axis_limits(points)
+    low, high = times_limits(points) if is_of_times else axis_limits(points)
     lows = [point.low for point in points if point.low is not None]
     highs = [point.high for point in points if point.high is not None]
     return min(lows, default=low) < low or max(highs, default=high) > high

@@ -28,7 +28,7 @@ def with_constants(table: Table, columns: dict[str, str]) -> Table:
         if value in table.index or meaning not in CONSTANTS or not like_a_number(value):
             continue
         texts = [value] * len(table.cells)
-        faults = [name for name in table.columns if ColumnName(name).meaning == "fault"]
+        faults = [cells.name for cells in table.columns_in_order if cells.name.meaning == "fault"]
         fault = columns.get("fault", next(iter(faults), ""))
         if meaning == "faulty" and fault in table.index:
             cells = table.columns[fault]

@@ -240,7 +240,7 @@ class Verdict:
     def at_zero(self) -> str:
         """What a report says of its value, and of a value of 0."""
         if self.compares_policies:
-            return "times P: of the first policy in times that of the other"
+            return "times P: P of the policy before 'against' / P of the other"
         return self.compared.definition.at_zero
 
     @property
