@@ -22,8 +22,9 @@ _MOST_CONDITIONS = 2  # that a note of the answer names
 _MEANINGS = {
     "decided": "supported: above 0; refuted: below 0",
     "compared": "more, less: of P than the policy behind 'against'",
-    "open": "open: neither an effect is shown nor that there is none; write neither",
-    "margin": "< {margin}: P is shown to differ by less, as a share of what it is compared with",
+    "open": "open alone: neither an effect is shown nor that there is none",
+    "margin": "open, < {margin}: P is shown to differ by less, as a share of what it is compared "
+    "with; whether up or down is open",
     "stalls": "stalls: one run that stalls, unseen so far, could turn it",
     "trainings": "trainings: one that collapses, unseen so far, could turn it",
     "Holm": "Holm: clear as the only question, not among all on the indicator",

@@ -52,7 +52,10 @@ def forest_figures(
     of_policies = [(line, point) for line, point in pairs if line.verdict.compares_policies]
     of_indicators = [(line, point) for line, point in pairs if not line.verdict.compares_policies]
     if of_policies:
-        label = "times P of the policy behind 'against' (logarithmic)"
+        first = of_policies[0][0].verdict
+        others = {line.verdict.compared.policy for line, _ in of_policies}
+        other = others.pop() if len(others) == 1 else "the policy behind 'against'"
+        label = f"P of {first.after.name} / P of {other} (logarithmic)"
         name = "times" if of_indicators else "answer"
         yield _forest_figure(name, label, results, answer, of_policies, is_of_times=True)
     if of_indicators:
