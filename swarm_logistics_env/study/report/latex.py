@@ -85,8 +85,9 @@ def _table(section: Section, about: str, label: str) -> Iterator[str]:
     yield rf"\caption{{{_escape(' '.join(filter(None, caption)))}}}"
     yield rf"\label{{{label}}}"
     yield r"\smallskip"
-    yield r"\scriptsize" if n_letters > _LETTERS_OF_A_PAGE else r"\footnotesize"
-    yield r"\setlength{\tabcolsep}{3pt}"
+    is_wide = n_letters > _LETTERS_OF_A_PAGE
+    yield r"\scriptsize" if is_wide else r"\footnotesize"
+    yield rf"\setlength{{\tabcolsep}}{{{1.5 if is_wide else 3}pt}}"
     yield rf"\begin{{tabular}}{{@{{}}{layout}@{{}}}}"
     yield from (r"\toprule", _row(map(_escape, section.columns)), r"\midrule")
     yield from map(_row, zip(*columns))
