@@ -56,11 +56,9 @@ def minimum_detectable_effect(estimate: Estimate, power: float = 0.8) -> float |
         return power - min(_power_at(estimate, side * distance, n, PLANNED_LIMIT) for side in sides)
 
     farthest = _FARTHEST * lowest
-    return (
-        float(brentq(excess, 0.0, farthest, xtol=1e-12 * lowest))
-        if excess(farthest) <= 0.0
-        else None
-    )
+    if excess(farthest) > 0.0:
+        return None
+    return float(brentq(excess, 0.0, farthest, xtol=1e-12 * lowest))
 
 
 def seeds_for_power(estimate: Estimate, effect: float, power: float = 0.8) -> int | None:

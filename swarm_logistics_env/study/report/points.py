@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 _MARGIN_OF_TIMES = 1.15  # of a logarithmic axis of factors, to both sides
-_FAR = 5.0  # an indicator from which on axes are linear up to 1 alone, and logarithmic beyond
+# An indicator from which on axes are linear up to 1 alone, and logarithmic beyond; and how many
+# times the most extreme factor an interval of factors is drawn to.
+_FAR = 5.0
 
 
 class Point(NamedTuple):

@@ -32,7 +32,7 @@ class Subject(NamedTuple):
 
     Attributes:
         policy: its label; empty: the trials name none.
-        task: which of a file's tables the trials stand in; empty: they are of one, or played.
+        task: which of a file's tables the trials stand in; empty: in its only one, or runs are played.
     """
 
     policy: str
@@ -94,10 +94,11 @@ class StudyResults:
     def subjects(self) -> Mapping[Case, Subject]:
         """Whose swarm each case is about."""
         subjects = {}
+        names_no_policy = self.names_no_policy
         for _, _, arm in self.plan.cells:
             scenario = arm.case.scenario
             task = scenario.table if isinstance(scenario, RecordedScenario) else ""
-            policy = "" if task and self.names_no_policy else arm.case.policy.title
+            policy = "" if task and names_no_policy else arm.case.policy.title
             subjects[arm.case] = Subject(policy, task)
         return subjects
 
