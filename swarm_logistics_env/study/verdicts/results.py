@@ -32,7 +32,7 @@ class Subject(NamedTuple):
 
     Attributes:
         policy: its label; empty: the trials name none.
-        task: which of a file's tables the trials stand in; empty: in its only one, or runs are played.
+        task: which of a file's tables the trials stand in; empty: it has one, or runs are played.
     """
 
     policy: str
