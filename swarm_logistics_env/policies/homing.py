@@ -15,7 +15,7 @@ commands no turn; a robot of the differential drive turns to where it wants to g
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -64,6 +64,13 @@ class HomingParameters(DrivingParameters):
     sure: Sure = 4.061
     clearance: Clearance = 0.2135
     obstacle_range: ObstacleRange = 0.6606
+
+    # What the search of `research/search_again.py` found in `dotbots`.
+    of_small_robots: ClassVar[Mapping[str, float]] = {
+        "spread_gain": 0.8703, "spread_range": 2.522, "avoid_gain": 0.8895, "avoid_range": 0.4894,
+        "wall_gain": 1.242, "wall_range": 0.3828, "sure": 8.48, "clearance": 0.2059,
+        "obstacle_range": 0.2237,
+    }  # fmt: skip
 
 
 Parameters = HomingParameters.for_kernels()

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import html
+import math
 import sys
 from collections import namedtuple
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self, cast, runtime_checkable
 
@@ -83,15 +84,21 @@ class Described:
 
 
 FITTED_RADIUS = 0.125  # of the robots for which parameters were fitted [m]
+SMALL_RADIUS = 0.05  # of those for which `of_small_robots` were [m]: DotBots
 
 
 class ScriptParameters(Record):
     """The parameters of a script, each with its unit and its meaning. This one has none.
 
     Compiled code reads them by the same names, see `for_kernels`.
+
+    Attributes:
+        of_small_robots: what takes the place of the default values among robots of 0.05 m, lengths
+            as robots of 0.125 m have them; what is left out stays.
     """
 
     error_type = PolicyError
+    of_small_robots: ClassVar[Mapping[str, float]] = {}
 
     @classmethod
     def for_kernels(cls) -> Callable[..., Self]:
@@ -108,18 +115,25 @@ class ScriptParameters(Record):
         return tuple(dict(self).values())
 
     def scaled_to(self, swarm: Scenario) -> Self:
-        """Return these with lengths as much larger as these robots are than those of the fit.
+        """Return these for robots as large as these.
 
-        Lengths that were published stay.
+        Lengths go with the radius; those that were published stay. Between 0.125 m and 0.05 m a
+        parameter goes with the power of the radius that leads to `of_small_robots`, whatever its
+        value is.
         """
         scale = swarm.robot_radius / FITTED_RADIUS
-        lengths = {
-            name: scale * getattr(self, name)
-            for name, field in type(self).model_fields.items()
-            if field.description and "[m]" in field.description
-            if "source" not in field.description
-        }
-        return self.model_copy(update=lengths)
+        way = math.log(scale) / math.log(SMALL_RADIUS / FITTED_RADIUS)
+        share = min(max(way, 0.0), 1.0)
+        scaled: dict[str, float] = {}
+        for name, field in type(self).model_fields.items():
+            value = getattr(self, name)
+            description = field.description or ""
+            if "[m]" in description and "source" not in description:
+                scaled[name] = scale * value
+            if name in self.of_small_robots:
+                change = self.of_small_robots[name] / field.default
+                scaled[name] = change**share * scaled.get(name, value)
+        return self.model_copy(update=scaled)
 
 
 class Scripted(Described):

@@ -178,15 +178,41 @@ def test_a_stock_is_the_less_deep_the_longer_robots_brake_and_the_smaller_they_a
     assert Parameters(*policy._values).near == pytest.approx(depth)
 
 
-@pytest.mark.parametrize("name", ["homing", "homing-stock"])
-def test_every_length_goes_with_the_radius_of_the_robots_and_nothing_else_does(name: str) -> None:
-    policy: Any = load(name)
+def values_by_radius(name: str, *radii: float, **parameters: Any) -> list[dict[str, float]]:
+    """Return the values that the kernel of a script gets, for robots of each radius."""
+    policy: Any = load(name, **parameters)
     values = []
-    for radius in (0.125, 0.05):
-        policy.configure(Scenario(robot_radius=radius, n_requests=2))
+    for radius in radii:
+        policy.configure(Scenario(robot_radius=radius, max_speed=0.5, n_requests=2))
         values.append(policy.parameters_type.for_kernels()(*policy._values)._asdict())
-    fitted, small = values
+    return values
+
+
+def test_every_length_of_a_stock_goes_with_the_radius_and_nothing_else_does() -> None:
+    fitted, small = values_by_radius("homing-stock", 0.125, 0.05)
     lengths = {name for name in fitted if name.endswith("_range")} | {"clearance", "near"}
     changed = {name for name in fitted if small[name] != fitted[name]}
     assert changed == lengths & fitted.keys()
     assert all(small[name] == pytest.approx(0.4 * fitted[name]) for name in changed)
+
+
+def test_homing_has_other_parameters_for_small_robots_and_goes_to_them_by_a_power() -> None:
+    large, fitted, middle, small, tiny = values_by_radius(
+        "homing", 0.2, 0.125, (0.125 * 0.05) ** 0.5, 0.05, 0.025
+    )
+    policy: Any = load("homing")
+    assert fitted == dict(policy.parameters)
+    assert small["spread_gain"] == pytest.approx(0.8703)
+    assert small["spread_range"] == pytest.approx(0.4 * 2.522)
+    assert small["grip_range"] == pytest.approx(0.4 * fitted["grip_range"])
+    assert small["home_share"] == fitted["home_share"]
+    # The geometric mean of both radii has that of both values.
+    assert all(middle[name] == pytest.approx((fitted[name] * small[name]) ** 0.5) for name in small)
+    # Beyond both, lengths alone go on.
+    assert large["spread_gain"] == fitted["spread_gain"]
+    assert large["spread_range"] == pytest.approx(1.6 * fitted["spread_range"])
+    assert tiny["spread_gain"] == pytest.approx(small["spread_gain"])
+    assert tiny["spread_range"] == pytest.approx(0.5 * small["spread_range"])
+    # A value of one's own changes by as much.
+    (twice,) = values_by_radius("homing", 0.05, spread_gain=2.0 * fitted["spread_gain"])
+    assert twice["spread_gain"] == pytest.approx(2.0 * small["spread_gain"])
