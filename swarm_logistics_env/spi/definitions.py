@@ -183,6 +183,8 @@ class Definition:
         arguments: the function's further arguments, from what differs.
         adjectives: threshold to what a swarm above it is called.
         at_zero: what the indicator is, and what 0 means, for a reader who knows none of them.
+        above: what it means in words that the indicator is above 0; empty: there are no such words.
+        below: that it is below 0.
     """
 
     symbol: str
@@ -193,6 +195,8 @@ class Definition:
     arguments: Callable[[Change], dict[str, Any]]
     adjectives: Mapping[float, str]
     at_zero: str
+    above: str = ""
+    below: str = ""
 
     @property
     def needs_removed(self) -> bool:
@@ -244,6 +248,8 @@ DEFINITIONS: dict[str, Definition] = {
             arguments=lambda c: {"n": int(c.before), "m": int(c.after - c.before)},
             adjectives={0.0: "scalable", 1.0: "superlinear"},
             at_zero="S = growth of P / growth of N; 0: more robots bring no more, 1: in proportion",
+            above="more robots raise P",
+            below="more robots lower P",
         ),
         Definition(
             symbol="FT",
@@ -253,8 +259,10 @@ DEFINITIONS: dict[str, Definition] = {
             function=fault_tolerance,
             arguments=lambda c: {"n": c.n_robots, "m": int(c.after)},
             adjectives={0.0: "tolerant"},
-            at_zero="FT = (P with the faulty robots - P without them) / P of all sound; "
-            "0: as if they were absent",
+            at_zero="FT = (P with the faulty robots - P with them removed) / P of all sound; "
+            "0: as if they were removed",
+            above="faulty robots are better than none",
+            below="P would be higher without the faulty robots",
         ),
         Definition(
             symbol="R",
@@ -266,6 +274,8 @@ DEFINITIONS: dict[str, Definition] = {
             adjectives={0.0: "robust"},
             at_zero="R = P with m of N faulty / P of all sound - (1 - m/N); 0: P falls by the "
             "share m/N, m/N: not at all",
+            above="faulty robots cost less than their share",
+            below="faulty robots cost more than their share",
         ),
         Definition(
             symbol="A",
@@ -277,6 +287,8 @@ DEFINITIONS: dict[str, Definition] = {
             adjectives={0.0: "adaptable", 1.0: "P has grown"},
             at_zero="A = 1 - fall of P / change of the parameter, as shares; 0: P falls by as "
             "large a share, 1: not at all",
+            above="P falls by a smaller share than the surroundings change",
+            below="P falls by a larger share than the surroundings change",
         ),
         Definition(
             symbol="change",

@@ -138,7 +138,9 @@ class Comparison:
             return f"to {after.name}, {after.condition}"
         if after.kind == "fault":
             start = f" from {after.onset:g} s" if after.onset else ""
-            return f"{after.name}{start}, {after.value:g} of {self.n_robots}"
+            text = self.original.case.task.failure_modes.get(after.name, "")
+            title = f" {text.partition(': ')[0]}" if ": " in text else ""
+            return f"{after.name}{title}{start}, {after.value:g} of {self.n_robots}"
         if after.kind == "policy":
             return f"with {after.name}"
         name = "N" if after.kind == "size" else after.name

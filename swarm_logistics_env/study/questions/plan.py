@@ -146,17 +146,13 @@ class Plan:
         return "" if engine == world.engine(task.default) else engine
 
     def __str__(self) -> str:
-        n_cells = len(self.cells)
         n_cases = len(self.cases)
-        # Of several trainings each has its conditions.
-        shared = f" ({n_cells - n_cases} shared)" if n_cells >= n_cases else ""
         start = self.specification.first_seed
         first = f" from {start} on" if start else ""
         most = "at most " if self.specification.until_clear else ""
         return (
-            f"{self.specification.name}: {len(self.comparisons)} comparisons of {n_cells} cells; "
-            f"{n_cases} conditions{shared} x {most}{len(self.seeds)} seeds{first} = "
-            f"{most}{n_cases * len(self.seeds)} runs"
+            f"{self.specification.name}: {len(self.comparisons)} questions; {n_cases} conditions x "
+            f"{most}{len(self.seeds)} seeds{first} = {most}{n_cases * len(self.seeds)} runs"
         )
 
 

@@ -22,12 +22,11 @@ _MOST_CONDITIONS = 2  # that a note of the answer names
 _MEANINGS = {
     "decided": "supported: above 0; refuted: below 0",
     "compared": "more, less: of P than the policy behind 'against'",
-    "open": "open alone: neither an effect is shown nor that there is none",
-    "margin": "open, < {margin}: P is shown to differ by less, as a share of what it is compared "
-    "with; whether up or down is open",
-    "stalls": "stalls: one run that stalls, unseen so far, could turn it",
-    "trainings": "trainings: one that collapses, unseen so far, could turn it",
-    "Holm": "Holm: clear as the only question, not among all on the indicator",
+    "open": "open, and no more: neither an effect is shown nor that there is none",
+    "margin": "P within {margin}: P is shown to change by less; in which direction is open",
+    "stalls": "open, stalls: too few runs to rule out rare ones that deliver nearly nothing",
+    "trainings": "open, trainings: too few trainings to rule out one that collapses",
+    "Holm": "open, Holm: clear as the only question, not among all on the indicator",
     "provisional": f"n < {SEEDS_OF_HEADLINE}: provisional",
     "unaffected": "unaffected: the same runs",
     "cannot_fail": "untestable, never < 0: as P cannot be",
@@ -65,7 +64,9 @@ def _modes(results: StudyResults) -> str:
     faults = [verdict.after.name for verdict in results.verdicts if verdict.after.kind == "fault"]
     modes = {mode for fault in faults for mode in fault.split("+")}
     described = results.plan.specification.played.failure_modes
-    texts = [f"{mode}: {text}" for mode, text in described.items() if mode in modes]
+    texts = [
+        f"{mode}: {text.rpartition(': ')[2]}" for mode, text in described.items() if mode in modes
+    ]
     return f"A faulty robot: {'; '.join(texts)}" if texts else ""
 
 

@@ -18,7 +18,7 @@ from .figures import (
     policies_figure,
     trade_off_figure,
 )
-from .for_a_paper import PaperTables, paper_tables
+from .for_a_paper import PaperTables, in_a_sentence, paper_tables
 from .points import Point
 from .section import Figure, Section
 from .sentences import sentence, verdict_sections
@@ -105,6 +105,8 @@ def document(results: StudyResults) -> Document:
     paper_sections = tuple(cell_tables(results, for_paper=True))
     further = tuple(further_tables(results))
     methods_section = Section("", lines=(methods(plan, results.looks),))
+    has_values = any(verdict.estimate for verdict in results.verdicts)
+    quotable = (Section("", lines=(in_a_sentence(results, study_answer),)),) if has_values else ()
     set_up = setup_sheet(plan)
     chapters = [
         Chapter("Warnings", "", (Section("Warnings", lines=lines),) if lines else ()),
@@ -133,6 +135,7 @@ def document(results: StudyResults) -> Document:
         ),
         Chapter("Set-up", "", set_up),
         Chapter("Methods", "", (methods_section,)),
+        Chapter("For a paper", "In a few sentences; tables.tex has the tables.", quotable),
     ]
     report = Document(
         text,

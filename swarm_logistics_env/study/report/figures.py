@@ -18,7 +18,8 @@ from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
 
 from . import drawing
-from .answer import Answer, Line
+from .answer import Answer
+from .answer_lines import Line
 from .points import Panel, Point, cuts_intervals
 from .section import P_LEVEL, Figure, join_names, levels, slug
 

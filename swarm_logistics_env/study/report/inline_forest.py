@@ -12,7 +12,8 @@ from typing import Literal, NamedTuple
 
 from more_itertools import map_reduce
 
-from .answer import Answer, Line
+from .answer import Answer
+from .answer_lines import Line
 from .points import Point, axis_limits, has_far_values, times_limits
 from .section import ratio
 

@@ -15,10 +15,10 @@ EFFECT = 0.1  # the smallest for which more seeds are worth while
 _MOST_NAMED = 3  # questions
 # What questions need, by the case that applies to them.
 _NEEDS = {
-    "within_reach": "{count} open: {n_seeds} new {runs} might decide them",
-    "beyond": "{count} open, for which {reach} {runs} are too few ({named})",
-    "none": "{count} open: no number in reach will do ({named})",
-    "small": f"{{count}} open of an effect below {EFFECT:g}, for which more are not worth while",
+    "within_reach": "{n_seeds} new {runs} might decide {count}",
+    "beyond": "for {count} {reach} {runs} are too few ({named})",
+    "none": "for {count} no number in reach will do ({named})",
+    "small": f"{{count}} of an effect below {EFFECT:g}, too small for more {{runs}}",
 }
 
 
@@ -45,7 +45,7 @@ def more_seeds(results: StudyResults) -> MoreSeeds:
     reach = max(MOST_SEEDS_UNTIL_CLEAR, 2 * n_played)
     needs: dict[str, list[tuple[Verdict, int | None]]] = {}
     for verdict in results.verdicts:
-        if verdict.on_property.adjusted == "open" and verdict.estimate is not None:
+        if verdict.conclusion == "open" and verdict.estimate is not None:
             case, n_seeds = _need(verdict, reach)
             needs.setdefault(case, []).append((verdict, n_seeds))
     runs = "trials a condition" if results.plan.origin else "seeds"
@@ -58,15 +58,14 @@ def more_seeds(results: StudyResults) -> MoreSeeds:
         for case, template in _NEEDS.items()
         if case in needs
     ]
-    return MoreSeeds(most, ", ".join(words))
+    n_open = sum(map(len, needs.values()))
+    return MoreSeeds(most, f"{n_open} open: {'; '.join(words)}" if words else "")
 
 
 def _need(verdict: Verdict, reach: int) -> tuple[str, int | None]:
     """Return which case of `_NEEDS` applies to an open verdict, and the seeds it needs."""
     estimate = verdict.estimate
     assert estimate is not None
-    if verdict.conclusion == "equivalent":
-        return "small", None
     n_seeds = spi.seeds_against_stalls(estimate)
     if n_seeds is None and "hidden_stalls" not in estimate.flags:
         side = math.copysign(EFFECT, estimate.value - estimate.threshold)

@@ -62,8 +62,11 @@ class WarehouseTask(TaskWorld):
 
     @property
     def failure_modes(self) -> dict[str, str]:
-        """The failure modes of `FAILURE_MODES`, each with what it does to a robot."""
-        return {mode: FAILURE_MODES[mode].description for mode in FAILURE_MODES}
+        """The failure modes of `FAILURE_MODES`, each with its title and what it does to a robot."""
+        return {
+            name: f"{mode.title}: {mode.description}" if mode.title else mode.description
+            for name, mode in FAILURE_MODES.items()
+        }
 
     def code(self) -> str:
         """Return the digest of the code that decides an episode, 16 hexadecimal digits.

@@ -152,7 +152,7 @@ VERDICT_COLUMNS: Columns[Verdict] = {
     "in_words": (
         str,
         "in_words",
-        "the verdict in a word or two, as every table has it, e.g. open, < 10 %",
+        "the verdict in a word or two, as every table has it, e.g. P within 10 %",
     ),
     "claim": (str, "claim", "what is claimed, e.g. not tolerant; missing: nothing"),
     "published": (float, "published", "the reference's value of the indicator"),

@@ -215,7 +215,7 @@ class Verdict:
 
     @property
     def in_words(self) -> str:
-        """The verdict in a word or two, as every table has it, e.g. "open, < 10 %".
+        """The verdict in a word or two, as every table has it, e.g. "P within 10 %".
 
         Below ten paired seeds a decision assumes normal differences, which "n < 10" says.
         """
@@ -226,7 +226,7 @@ class Verdict:
         if self.estimate is None and str(self.problem).endswith(" missing"):
             return "not played"
         if self.conclusion == "equivalent":
-            return f"{word}, < {100 * self.margin:.3g} %"
+            return f"P within {100 * self.margin:.3g} %"
         if is_decided and "assumes_normal" in self.flags:
             return f"{word}, n < {SEEDS_OF_HEADLINE}"
         return f"{word}, {self.reason}" if self.reason else word

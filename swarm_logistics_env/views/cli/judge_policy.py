@@ -39,7 +39,7 @@ from .study_commands import (
     run_study,
     say_what_a_pilot_shows,
 )
-from .terminal import say, say_what_was_played, show, show_report
+from .terminal import program, say, say_what_was_played, show, show_report
 from .world_choice import (
     BodiesOption,
     PresetOption,
@@ -140,8 +140,8 @@ def judge_policy_command(
     if world is None and not (tally.left or tally.failed):
         _show_benchmark(results, entry_digest(specs[0]), directory)
     else:
-        show_report(results, directory, full=full, is_finished=not tally.left)
-    is_open = any(verdict.on_property.adjusted == "open" for verdict in results.verdicts)
+        show_report(results, directory, full=full)
+    is_open = any(verdict.conclusion == "open" for verdict in results.verdicts)
     if tally.left and not tally.gave_up:
         reason = f"Stopped after {minutes:g} min, {tally.left} runs are left"
         say(f"{reason}; the same command goes on:", str(context.obj))
@@ -261,15 +261,14 @@ def _study_in(
 
 
 def _suggest_more_seeds(options: Sequence[str], directory: Path, results: StudyResults) -> None:
-    """Say what open questions need, as the report does, with the command if that is in reach."""
+    """Say which command plays what open questions need, if that is in reach."""
     needs = more_seeds(results)
     if needs.n_seeds is None:
-        say(f"What is open: {needs.words}.")
         return
     n_seeds = str(needs.n_seeds)
     options = [*options, "--seeds", n_seeds, "--out", f"{directory}-{n_seeds}"]
-    command = f"swarm-logistics judge {join(options)}"
-    say(f"What is open: {needs.words}. With seeds that nobody has looked at:", command)
+    command = f"{program()} judge {join(options)}"
+    say("More seeds, which nobody has looked at:", command)
 
 
 def _show_benchmark(results: StudyResults, digest: str, out: Path) -> None:

@@ -30,6 +30,7 @@ from .policy_choice import EnvOption, FrameOption, NormalizeOption, TrustOption,
 from .study_choice import change_scenario, changes_in_words, study_of, switch_to_clearing
 from .terminal import (
     AnswerSoFar,
+    program,
     say,
     say_what_was_played,
     show_power,
@@ -177,7 +178,7 @@ def run_command(
     else:
         say(
             f"When all {part.count} shards are done:",
-            f"swarm-logistics study merge {out}/shard-*-of-{part.count} --out {out}",
+            f"{program()} study merge {out}/shard-*-of-{part.count} --out {out}",
         )
     # The last line: where it is looked for after a report of many pages.
     say_what_was_played(tally)

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from shlex import quote
+from shutil import which
 
 import numpy as np
 from rich.console import Console
@@ -22,7 +23,6 @@ from swarm_logistics_env.core.records import plain
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.document import document
 from swarm_logistics_env.study.report.drawing import PAGE_STYLE, FigureStyle
-from swarm_logistics_env.study.report.for_a_paper import in_a_sentence
 from swarm_logistics_env.study.report.section import NOTHING, Section, Texts, levels, number
 from swarm_logistics_env.study.report.terminal_answer import PLAIN_WIDTH, terminal_answer
 from swarm_logistics_env.study.report.write import (
@@ -55,6 +55,13 @@ def show(section: Section) -> None:
     console.print()
 
 
+def program() -> str:
+    """Return what to type for this program: its name, or its path where no shell finds the name."""
+    name = "swarm-logistics"
+    is_path = Path(sys.argv[0]).name == name and which(name) is None
+    return quote(sys.argv[0]) if is_path else name
+
+
 def say(text: str, command: str = "") -> None:
     """Print text, folded between words at a terminal, and a command to paste on its own line."""
     console = Console()
@@ -75,14 +82,12 @@ def show_report(
     out: Path,
     *,
     full: bool,
-    is_finished: bool = True,
     style: FigureStyle = PAGE_STYLE,
 ) -> None:
-    """Print the answer of a study and a sentence for a paper, and write its report into `out`.
+    """Print the answer of a study, and write its report into `out`.
 
     Args:
         full: print every table before.
-        is_finished: whether all is played; else no sentence is for a paper.
         style: of the files of figures; those in the page have its own.
     """
     report = document(results)
@@ -99,9 +104,7 @@ def show_report(
         echo(advice)
     else:
         echo(f"Figure: {out / 'figures' / 'answer.svg'}")
-        echo(f"Tables: {out / 'tables.tex'}")
-    if is_finished and any(verdict.estimate for verdict in results.verdicts):
-        say(f"For a paper: {plain(in_a_sentence(results, report.answer))}")
+        echo(f"Tables for a paper: {out / 'tables.tex'}")
 
 
 class AnswerSoFar:

@@ -88,7 +88,11 @@ def scenario_of(
     if not (preset or file):
         base = _training_scenario(policies)
         if base is None and usual is not None:
-            say(f"In the world of the preset {USUAL_PRESET}; --preset or --scenario names another.")
+            back = ", where items come back" if usual.restock else ""
+            say(
+                f"In the world of the preset {USUAL_PRESET}{back}; --preset or --scenario names "
+                "another."
+            )
             base = usual
     base = base or Scenario.preset(str(preset or USUAL_PRESET))
     return base.replace(**{**fields, **changed_fields(changes, bodies)})

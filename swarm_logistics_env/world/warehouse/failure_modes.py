@@ -44,6 +44,7 @@ class FailureMode:
     Attributes:
         description: in a sentence.
         mark: what its robots wear in pictures, one or two letters; none: the mode's name.
+        title: in two words, for tables of verdicts; none: the mode's name says it.
         speed: factor in [0, 1] on its top speed and turn rate.
         view: factor in [0, 1] on its cameras' range.
         battery: factor in [0, 1] on what its battery holds.
@@ -61,6 +62,7 @@ class FailureMode:
 
     description: str
     mark: str = ""
+    title: str = ""
     speed: float = 1.0
     view: float = 1.0
     battery: float = 1.0
@@ -89,16 +91,22 @@ class FailureMode:
 # all robots, i.e. the requests and the deliveries, which clear their memories, reaches robots in
 # FM3 as well: the paper's "cannot communicate with their neighbours". `FM3_isolated` loses both.
 FAILURE_MODES: dict[str, FailureMode] = {
-    "FM1": FailureMode("always tells timer 0, as if in the delivery area", mark="1", honest=False),
-    "FM2": FailureMode("never picks up", mark="2", lifts=False),
+    "FM1": FailureMode(
+        "always tells timer 0, as if in the delivery area",
+        mark="1",
+        title="false timer",
+        honest=False,
+    ),
+    "FM2": FailureMode("never picks up", mark="2", title="lifts nothing", lifts=False),
     "FM3": FailureMode(
         "neither sends nor hears, but is told of requests and deliveries",
         mark="3",
+        title="no radio",
         sends=False,
         hears=False,
     ),
-    "FM3_send": FailureMode("does not send", mark="3s", sends=False),
-    "FM3_hear": FailureMode("does not hear", mark="3h", hears=False),
+    "FM3_send": FailureMode("does not send", mark="3s", title="mute", sends=False),
+    "FM3_hear": FailureMode("does not hear", mark="3h", title="deaf", hears=False),
     "FM3_isolated": FailureMode(
         "as FM3, and is told of no request and no delivery",
         mark="3i",
@@ -106,10 +114,16 @@ FAILURE_MODES: dict[str, FailureMode] = {
         hears=False,
         hears_requests=False,
     ),
-    "FM4": FailureMode("its entering the delivery area delivers nothing", mark="4", delivers=False),
+    "FM4": FailureMode(
+        "delivers nothing when it enters the delivery area",
+        mark="4",
+        title="no delivery",
+        delivers=False,
+    ),
     "FM4_jam": FailureMode(
         "as FM4, and what it holds inside the delivery area it cannot let go",
         mark="4j",
+        title="holds on",
         delivers=False,
         releases_inside=False,
     ),

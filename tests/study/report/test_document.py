@@ -23,7 +23,6 @@ from tests.study.report.conftest import NARROW
 FROZEN = Path(__file__).parents[2] / "frozen"
 
 
-@pytest.mark.daily
 def test_a_report_is_as_recorded(tmp_path: Path) -> None:
     """Every number and sentence, but for the sheet of the set-up."""
     results = paper(seeds=12, noise=2.0, full=NARROW, unaffected=frozenset({"FM2"}))

@@ -70,7 +70,10 @@ def test_policies_share_the_row_of_a_question_in_the_figure_and_the_legend_names
     canvas = drawn["answer"]
     (axes,) = canvas.axes
     labels = [tick.get_text() for tick in axes.get_yticklabels()]
-    of_both = ["FM1, 1 of 25", "FM1, 3 of 25", "FM4, 1 of 25", "FM4, 3 of 25"]
+    of_both = [
+        *("FM1 false timer, 1 of 25", "FM1 false timer, 3 of 25"),
+        *("FM4 no delivery, 1 of 25", "FM4 no delivery, 3 of 25"),
+    ]
     assert labels[-5:] == ["Robustness R", *of_both]
     # A heading stands among the labels.
     assert len(answer(results).lines) == len(conditions) + 2 * (len(labels) - 1)
@@ -99,7 +102,7 @@ def test_three_policies_stand_in_one_table_beside_the_first_and_holm_counts_all_
     )
     assert [sentence[:14] for sentence in indicators] == ["Scalability S:", "Robustness R: "]
     assert indicators[1].endswith(
-        "; lowest at homing: FM4, 1 of 25: P 209→52, R -0.71 [-0.71, -0.71], refuted."
+        "; lowest at homing: FM4 no delivery, 1 of 25: P 209→52, R -0.71 [-0.71, -0.71], refuted."
     )
     text = terminal_answer(of_three)
     assert max(map(len, text.splitlines())) <= 80

@@ -70,7 +70,7 @@ def test_every_surface_names_the_level_that_it_prints(
     stopped: StudyResults, tmp_path: Path
 ) -> None:
     level_by_question = {
-        f"R {test.after.name}": percent(test.estimate.confidence)
+        test.question.removesuffix(", 1 of 25"): percent(test.estimate.confidence)
         for test in stopped.verdicts
         if test.estimate
     }
@@ -110,13 +110,14 @@ def test_every_surface_names_the_level_that_it_prints(
         assert re.search(
             rf"^\| {question}, 1 of 25 \| .*\]{own} \|", surfaces["report"], re.MULTILINE
         )
-        assert re.search(rf"\| {question[2:]}, m = 1 \|.*\| {level} \|", surfaces["report"])
         indicator, _, fault = question.partition(" ")
+        mode = fault.split()[0]
+        assert re.search(rf"\| {mode}, m = 1 \|.*\| {level} \|", surfaces["report"])
         part = page.split(f">Robustness {indicator}</th>")[1]
         assert re.search(rf'{fault}, 1 of 25</th><td class="number">.*\]{own}</td>', part)
         assert re.search(rf"^{question}, 1 of 25 & .*\]{own}.? & ", tex, re.MULTILINE)
     assert f"{levels(stopped.verdicts)} intervals" in surfaces["figures"]
-    worst = f", R -0.55 [-0.67, -0.37] at {level_by_question['R FM4']}, refuted"
+    worst = f", R -0.55 [-0.67, -0.37] at {level_by_question['R FM4 no delivery']}, refuted"
     assert worst in surfaces["sentence"]
     assert "bars: 95 % intervals" in full_document.runs.note
     for file, column in (("claims", "confidence"), ("figures/answer", "confidence")):
@@ -141,11 +142,11 @@ def test_the_words_of_a_verdict_are_the_same_in_terminal_page_latex_and_csv(
     latex = (tmp_path / "tables.tex").read_text(encoding="utf-8")
     tex = re.sub(r"\$|\\phantom{.*?}", "", latex).replace("\\,\\%", " %")
     for verdict in stopped.verdicts:
-        label = f"{verdict.after.name}, 1 of 25"
         condition = f"{verdict.after.name}, m = 1"
-        assert re.search(rf"^\| R {label} \|.*\| {verdict.in_words} \|$", report, re.MULTILINE)
+        question = verdict.question
+        assert re.search(rf"^\| {question} \|.*\| {verdict.in_words} \|$", report, re.MULTILINE)
         assert re.search(rf"^\| {condition} \|.*\| {verdict.in_words} \|$", report, re.MULTILINE)
-        assert re.search(rf"^R {label} &.*& {verdict.in_words} \\\\", tex, re.MULTILINE)
+        assert re.search(rf"^{question} &.*& {verdict.in_words} \\\\", tex, re.MULTILINE)
         row = rf"^{verdict.after.name}, {{m = 1}} &.*& {verdict.in_words} \\\\"
         assert re.search(row, tex, re.MULTILINE)
 
@@ -156,9 +157,9 @@ def test_a_paper_is_told_conditions_seeds_and_why_each_question_was_played_no_fu
     world = "a warehouse of 10 m x 10 m with 60 items, robots of 2 m/s"
     how = "(preset paper, engine chipmunk), 60 paired seeds (0 to 59)"
     assert sentence.startswith(f"swarm-dt in {world} {how}. swarm-dt: P [95 %] = ")
-    assert (
-        "; robustness R: 1 refuted (FM4, 1 of 25), 1 open; lowest at FM4, 1 of 25: P 3" in sentence
-    )
+    worst = "FM4 no delivery, 1 of 25"
+    counts = f"1 refuted ({worst}), 1 with P within 10 %"
+    assert f"; robustness R: {counts}; lowest at {worst}: P 3" in sentence
     assert sentence.endswith(
         "looked at after 10, 20, 30, 40, 50 and 60 seeds: of 2 questions 1 stopped where clear, "
         "1 after all 60 seeds."

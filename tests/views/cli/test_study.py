@@ -61,7 +61,7 @@ def test_study_run_prints_and_writes_the_report(file: Path, command: Command) ->
     file.write_text(f"{short}\n[[faults]]\nmodes = ['FM1']\nrobots = [1]\n")
     printed = command(f"{RUN} --out out --full")
     for words in (
-        "4 conditions (1 shared) x 2 seeds = 8 runs",
+        "3 questions; 4 conditions x 2 seeds = 8 runs",
         "Scalability",
         "Fault tolerance and robustness",
         "undefined: it delivers nothing",
@@ -104,7 +104,7 @@ def test_study_plan_prints_conditions_once_and_what_they_take(file: Path, comman
     printed = command("study plan mine.toml --policy swarm-dt --seeds 3 --first-seed 1000")
     # N = 4 is the baseline of the faults as well.
     assert "Scalability (N = 4); Fault tolerance and robustness (no fault)" in printed
-    assert "4 conditions (1 shared) x 3 seeds from 1000 on = 12 runs" in printed
+    assert "4 conditions x 3 seeds from 1000 on = 12 runs" in printed
     assert list(Path().iterdir()) == [file]
 
 

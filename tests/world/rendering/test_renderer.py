@@ -18,6 +18,7 @@ from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.world.rendering import Renderer, palette
 from swarm_logistics_env.world.warehouse import FAILURE_MODES, WarehouseState
+from swarm_logistics_env.world.warehouse.orders import DUE
 from swarm_logistics_env.world.warehouse.state import CARRIED, DELIVERED, NOBODY
 
 Frame = NDArray[np.uint8]
@@ -122,7 +123,27 @@ def small_hall() -> Frame:
     return hall(130)
 
 
-@pytest.mark.parametrize("scene", [room, hall, small_hall])
+def yard() -> Frame:
+    """Batteries, a station that is broken, kinds of robots, orders with a due time, one late."""
+    kinds = "lifter:2, scout:1 robot_radius=0.2, third:1, fourth:1"
+    scenario = Scenario.preset("day").replace(
+        floor=None, n_robots=5, n_items=6, robot_radius=0.3, robot_kinds=kinds, n_stations=2
+    )
+    world = Warehouse(scenario)
+    world.reset(0)
+    state: Any = world.state
+    state.robot_position[:] = [[3, 2], [5, 8], [8, 4], [6, 6], [9, 9]]
+    state.robot_heading[:] = [0.0, 0.8, 2.0, -1.2, 3.1]
+    state.item_position[:] = [[4.2, 1.1], [2, 5.5], [5.5, 4], [1, 9], [7, 7], [3, 3.5]]
+    state.batteries.energy[:] *= [1.0, 0.6, 0.25, 0.15, 0.02]
+    state.batteries.n_dead[0] = 1
+    state.open_requests[:2] = 0, 1
+    state.orders.open[:2, DUE] = 5.0, 500.0
+    state.progress.time[0] = 12.3
+    return frame(state, scenario, 500)
+
+
+@pytest.mark.parametrize("scene", [room, hall, small_hall, yard])
 def test_pictures_are_as_recorded(scene: Callable[[], Frame], tmp_path: Path) -> None:
     """To every bit with the recorded version of pygame; other ones draw letters otherwise."""
     import pygame
