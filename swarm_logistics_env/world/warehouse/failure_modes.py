@@ -44,7 +44,6 @@ class FailureMode:
     Attributes:
         description: in a sentence.
         mark: what its robots wear in pictures, one or two letters; none: the mode's name.
-        title: in two words, for tables of verdicts; none: the mode's name says it.
         speed: factor in [0, 1] on its top speed and turn rate.
         view: factor in [0, 1] on its cameras' range.
         battery: factor in [0, 1] on what its battery holds.
@@ -58,11 +57,11 @@ class FailureMode:
         returns: who is out of the arena comes back when the fault ends; else it is out for good.
         lifts, delivers, sends, hears, hears_requests, honest, obeys, releases_inside,
             rangers_refresh, messages_refresh, messages_mean, messages_true: see `Capabilities`.
+        title: in two words, for tables of verdicts; none: the mode's name says it.
     """
 
     description: str
     mark: str = ""
-    title: str = ""
     speed: float = 1.0
     view: float = 1.0
     battery: float = 1.0
@@ -85,6 +84,7 @@ class FailureMode:
     messages_refresh: bool = True
     messages_mean: bool = True
     messages_true: bool = True
+    title: str = ""
 
 
 # Sending and hearing are the robots' own radio, i.e. timers and messages. What the warehouse tells
