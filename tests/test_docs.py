@@ -151,13 +151,15 @@ def run(block: str) -> dict[str, Any]:
 
 
 def test_readme_runs_as_written() -> None:
-    (environment,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+    environment, controller = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
     interval = r" \| [\d.]+ \[[\d.]+, [\d.]+\]"
     rows = re.findall(rf"^\| `\S+`, [^|]+(?:{interval}){{5}} \|$", README, re.MULTILINE)
     assert len(rows) == 4
     names = run(environment.replace("n_robots=25", "n_robots=25, duration=2.0"))
     assert len(names["observations"]) == 25
     assert all(names["truncations"].values())
+    circles = run(f"import numpy as np\n{controller}")["Circles"]
+    assert run_episode(Scenario(duration=2.0), circles(), seed=0).delivered == 0
     assert "swarm-logistics judge wanderer:Wanderer" in README
     example = (ROOT / "examples" / "wanderer.py").read_text(encoding="utf-8")
     assert example.partition("\n\n")[2] in PAGES["quickstart.md"]

@@ -42,6 +42,9 @@ GROUPS: dict[str, tuple[str, ...]] = {
     ),
     "signals": ("robot_timer", "robot_told", "robot_heard", "robot_message", "last_in_delivery"),
     "counts": ("step", "time", "requested", "delivery_times", "delivered_by", "anchoring_seconds"),
+    "orders": ("orders",),
+    "batteries": ("batteries",),
+    "contacts": ("contacts",),
 }  # fmt: skip
 
 Events = Mapping[int, Callable[[Warehouse], None]]  # what is done to the world before a step
@@ -128,6 +131,11 @@ GOLDEN |= {
         Scenario.preset("day").replace(battery=2000.0, order_rate=0.5),
         (Fault("away", 2, 5.0, 10.0), Fault("dead", 2, intermittent=(5.0, 5.0))),
         policy="homing+charging",
+        steps=650,
+    ),
+    "orders in bursts": GoldenTrajectory(
+        Scenario.preset("orders").replace(order_rate=0.5, order_cycle=20.0, request_timeout=10.0),
+        policy="homing-stock",
         steps=650,
     ),
     "robots of two sizes": GoldenTrajectory(
@@ -219,6 +227,8 @@ def digests(golden: GoldenTrajectory, *, copied_at: int | None = None) -> Digest
 
 
 def _bytes(value: Any) -> bytes:
+    if isinstance(value, tuple) and hasattr(value, "_fields"):
+        return b"".join(map(_bytes, value))
     array = np.asarray(value)
     if array.dtype == object:  # no number has it
         return repr(value).encode()

@@ -15,9 +15,9 @@ EFFECT = 0.1  # the smallest for which more seeds are worth while
 _MOST_NAMED = 3  # questions
 # What questions need, by the case that applies to them.
 _NEEDS = {
-    "within_reach": "{n_seeds} new {runs} might decide {count}",
-    "beyond": "for {count} {reach} {runs} are too few ({named})",
-    "none": "for {count} no number in reach will do ({named})",
+    "within_reach": "{n_seeds} new {runs} might decide {them}",
+    "beyond": "{reach} {runs} are too few for {them} ({named})",
+    "none": "no number in reach will do for {them} ({named})",
     "small": f"{{count}} of an effect below {EFFECT:g}, too small for more {{runs}}",
 }
 
@@ -53,7 +53,12 @@ def more_seeds(results: StudyResults) -> MoreSeeds:
     most = max(within_reach, default=None)
     words = [
         template.format(
-            count=len(needs[case]), n_seeds=most, runs=runs, reach=reach, named=_named(needs[case])
+            count=len(needs[case]),
+            them="them" if len(needs) == 1 else len(needs[case]),
+            n_seeds=most,
+            runs=runs,
+            reach=reach,
+            named=_named(needs[case]),
         )
         for case, template in _NEEDS.items()
         if case in needs
