@@ -67,9 +67,9 @@ class HomingParameters(DrivingParameters):
 
     # What the search of `research/search_again.py` found in `dotbots`.
     of_small_robots: ClassVar[Mapping[str, float]] = {
-        "spread_gain": 0.8703, "spread_range": 2.522, "avoid_gain": 0.8895, "avoid_range": 0.4894,
-        "wall_gain": 1.242, "wall_range": 0.3828, "sure": 8.48, "clearance": 0.2059,
-        "obstacle_range": 0.2237,
+        "spread_gain": 3.04, "spread_range": 0.6695, "avoid_gain": 0.4139, "avoid_range": 2.178,
+        "wall_gain": 0.2695, "wall_range": 1.175, "sure": 2.088, "clearance": 0.9644,
+        "obstacle_range": 0.3386,
     }  # fmt: skip
 
 

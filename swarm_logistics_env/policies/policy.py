@@ -84,7 +84,9 @@ class Described:
 
 
 FITTED_RADIUS = 0.125  # of the robots for which parameters were fitted [m]
-SMALL_RADIUS = 0.05  # of those for which `of_small_robots` were [m]: DotBots
+FITTED_SPEED = 1.0  # their top speed [m/s]
+SMALL_RADIUS = 0.05  # of those for which `of_small_robots` was: DotBots [m]
+HIGH_SPEED = 2.0  # of those for which `of_fast_robots` was: the paper's [m/s]
 
 
 class ScriptParameters(Record):
@@ -93,12 +95,14 @@ class ScriptParameters(Record):
     Compiled code reads them by the same names, see `for_kernels`.
 
     Attributes:
-        of_small_robots: what takes the place of the default values among robots of 0.05 m, lengths
-            as robots of 0.125 m have them; what is left out stays.
+        of_small_robots: how many times as large parameters are among robots of 0.05 m, lengths
+            beside their radius; what is left out stays.
+        of_fast_robots: the same of robots of 2 m/s.
     """
 
     error_type = PolicyError
     of_small_robots: ClassVar[Mapping[str, float]] = {}
+    of_fast_robots: ClassVar[Mapping[str, float]] = {}
 
     @classmethod
     def for_kernels(cls) -> Callable[..., Self]:
@@ -115,25 +119,32 @@ class ScriptParameters(Record):
         return tuple(dict(self).values())
 
     def scaled_to(self, swarm: Scenario) -> Self:
-        """Return these for robots as large as these.
+        """Return these for robots as large and as fast as these.
 
         Lengths go with the radius; those that were published stay. Between 0.125 m and 0.05 m a
-        parameter goes with the power of the radius that leads to `of_small_robots`, whatever its
-        value is.
+        parameter goes with the power of the radius that leads to `of_small_robots`, and between
+        1 m/s and 2 m/s with that of the speed that leads to `of_fast_robots`.
         """
         scale = swarm.robot_radius / FITTED_RADIUS
-        way = math.log(scale) / math.log(SMALL_RADIUS / FITTED_RADIUS)
-        share = min(max(way, 0.0), 1.0)
-        scaled: dict[str, float] = {}
-        for name, field in type(self).model_fields.items():
-            value = getattr(self, name)
-            description = field.description or ""
-            if "[m]" in description and "source" not in description:
-                scaled[name] = scale * value
-            if name in self.of_small_robots:
-                change = self.of_small_robots[name] / field.default
-                scaled[name] = change**share * scaled.get(name, value)
-        return self.model_copy(update=scaled)
+        factors = {
+            name: scale
+            for name, field in type(self).model_fields.items()
+            if field.description and "[m]" in field.description
+            if "source" not in field.description
+        }
+        smallness = _way(FITTED_RADIUS, swarm.robot_radius, SMALL_RADIUS)
+        speed = _way(FITTED_SPEED, swarm.max_speed, HIGH_SPEED)
+        for way, changes in ((smallness, self.of_small_robots), (speed, self.of_fast_robots)):
+            for name, change in changes.items():
+                factors[name] = change**way * factors.get(name, 1.0)
+        return self.model_copy(
+            update={name: factor * getattr(self, name) for name, factor in factors.items()}
+        )
+
+
+def _way(start: float, value: float, end: float) -> float:
+    """Return how far it is from `start` to `end` on a logarithmic scale, in [0, 1]."""
+    return min(max(math.log(value / start) / math.log(end / start), 0.0), 1.0)
 
 
 class Scripted(Described):

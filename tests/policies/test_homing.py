@@ -202,8 +202,8 @@ def test_homing_has_other_parameters_for_small_robots_and_goes_to_them_by_a_powe
     )
     policy: Any = load("homing")
     assert fitted == dict(policy.parameters)
-    assert small["spread_gain"] == pytest.approx(0.8703)
-    assert small["spread_range"] == pytest.approx(0.4 * 2.522)
+    assert small["spread_gain"] == pytest.approx(0.8703, rel=1e-3)
+    assert small["spread_range"] == pytest.approx(0.4 * 2.522, rel=1e-3)
     assert small["grip_range"] == pytest.approx(0.4 * fitted["grip_range"])
     assert small["home_share"] == fitted["home_share"]
     # The geometric mean of both radii has that of both values.

@@ -168,13 +168,26 @@ def test_every_constant_says_whether_it_has_a_source_or_was_fitted() -> None:
         assert source in (SOURCES if kind == "source" else {""}), name
 
 
-def test_the_lengths_of_the_tuned_one_alone_go_with_the_radius_of_the_robots() -> None:
-    small = Scenario(robot_radius=0.05)
-    for name, scale in (("swarm-dt-tuned", 0.4), ("swarm-dt", 1.0)):
+def test_the_tuned_one_alone_goes_with_the_radius_and_the_speed_of_the_robots() -> None:
+    fields: list[dict[str, Any]] = [
+        {},
+        {"robot_radius": 0.05},
+        {"max_speed": 2.0},
+        {"max_speed": 0.3},
+    ]
+    lengths = ("avoidance_range", "item_avoidance_range", "wall_distance")
+    changes = [{}, dict.fromkeys(lengths, 0.4), dict(SwarmDTParameters.of_fast_robots), {}]
+    for name in ("swarm-dt-tuned", "swarm-dt"):
         policy: Any = load(name)
-        policy.configure(small)
-        fitted = policy.parameters
-        values = Parameters(*policy._values)
-        for length in ("avoidance_range", "item_avoidance_range", "wall_distance"):
-            assert getattr(values, length) == pytest.approx(scale * getattr(fitted, length))
-        assert values.diffusion == fitted.diffusion
+        for changed, factors in zip(fields, changes):
+            scenario = Scenario(**{"max_speed": 0.5, **changed})
+            policy.configure(scenario)
+            kernel_values: Any = Parameters(*policy._values)
+            values = kernel_values._asdict()
+            if name == "swarm-dt":
+                factors = {}
+            for parameter, value in dict(policy.parameters).items():
+                expected = value * factors.get(parameter, 1.0)
+                assert values[parameter] == pytest.approx(expected), (name, parameter)
+            drop = -math.expm1(-values["drop_rate"] * scenario.control_period)
+            assert policy._constants.drop_probability == pytest.approx(drop)
