@@ -73,8 +73,14 @@ class SwarmDTParameters(ScriptParameters):
         False, description="whether they go with the radius and the top speed of robots; fitted"
     )
 
+    # What the search of `research/search_again.py` found in `dotbots`.
+    of_small_robots: ClassVar[Mapping[str, float]] = {
+        "diffusion": 0.852, "avoidance_gain": 0.738, "avoidance_range": 3.7,
+        "item_avoidance_gain": 3.91, "item_avoidance_range": 3.36, "wall_distance": 0.395,
+        "taxis_gain": 2.14, "drop_rate": 0.394,
+    }  # fmt: skip
     # Noise and drops go with the way. That robots begin to avoid each other earlier was found by
-    # the search of `research/search_again.py` in the paper's world.
+    # that search in the paper's world.
     of_fast_robots: ClassVar[Mapping[str, float]] = {
         "diffusion": 2.0, "drop_rate": 2.0, "avoidance_range": 4.0,
     }  # fmt: skip

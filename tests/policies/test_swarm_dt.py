@@ -176,7 +176,11 @@ def test_the_tuned_one_alone_goes_with_the_radius_and_the_speed_of_the_robots() 
         {"max_speed": 0.3},
     ]
     lengths = ("avoidance_range", "item_avoidance_range", "wall_distance")
-    changes = [{}, dict.fromkeys(lengths, 0.4), dict(SwarmDTParameters.of_fast_robots), {}]
+    of_small = {
+        parameter: factor * (0.4 if parameter in lengths else 1.0)
+        for parameter, factor in SwarmDTParameters.of_small_robots.items()
+    }
+    changes = [{}, of_small, dict(SwarmDTParameters.of_fast_robots), {}]
     for name in ("swarm-dt-tuned", "swarm-dt"):
         policy: Any = load(name)
         for changed, factors in zip(fields, changes):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario
 from swarm_logistics_env.adapters import CentralEnv
@@ -15,7 +16,13 @@ from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.world import motion
 from swarm_logistics_env.world.motion.actions import ACTIONS
 from swarm_logistics_env.world.motion.network_inputs import INPUTS
-from swarm_logistics_env.wrappers import DiscreteActions, MotionFrame, ParameterChange, SwarmSize
+from swarm_logistics_env.wrappers import (
+    DiscreteActions,
+    MotionFrame,
+    ParameterChange,
+    SwarmSize,
+    Wrapper,
+)
 from tests.wrappers.conftest import small
 
 NUMBERS = {name: number for number, name in enumerate(ACTIONS)}
@@ -161,3 +168,18 @@ def test_the_motion_frame_steers_the_bodies_that_robots_have_in_the_episode() ->
     for _ in range(10):
         outputs = rng.uniform(-1.0, 1.0, (6, 3))
         np.testing.assert_equal(changed.step_arrays(outputs), always.step_arrays(outputs))
+
+
+class Numbered(Wrapper):
+    """Tells each robot its number."""
+
+    @property
+    def robot_info(self) -> dict[str, NDArray[Any]]:
+        return {"number": np.arange(self.n_rows)}
+
+
+def test_masks_stand_beside_what_other_wrappers_tell_a_robot() -> None:
+    _, infos = DiscreteActions(Numbered(small(n_robots=3))).reset(seed=0)
+    for number, info in enumerate(infos.values()):
+        assert info["number"] == number
+        assert info["action_mask"].shape == (len(ACTIONS),)

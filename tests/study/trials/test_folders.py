@@ -117,3 +117,9 @@ def test_a_column_that_is_left_out_need_not_be_in_all_files(tmp_path: Path) -> N
     ):
         read_trials(tmp_path)
     assert len(read_trials(tmp_path, ignore=["note"]).rows) == 8
+
+
+def test_files_whose_names_say_different_things_are_refused(tmp_path: Path) -> None:
+    write(tmp_path, **{"day=1.csv": DAY, "other.csv": OTHER_DAY})
+    with pytest.raises(spi.IndicatorError, match=r"other\.csv names nothing, but .*1\.csv day$"):
+        read_trials(tmp_path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import logging
 import os
 import random
 import signal
@@ -15,6 +16,7 @@ from pathlib import Path
 
 import aiohttp
 import pytest
+from aiohttp.http_exceptions import BadHttpMessage
 
 from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.views.watch import Session, server
@@ -254,3 +256,14 @@ def test_a_note_ends_and_no_page_that_is_opened_later_shows_it(
     assert "note" not in messages(served, [], 2)[-1]
     monkeypatch.setattr(server, "_NOTE_LASTS", 0.0)
     wait_until(lambda: not served.server.session.note)
+
+
+@pytest.mark.parametrize(
+    ("error", "is_own"),
+    [(ValueError(), True), (ConnectionResetError(), False), (BadHttpMessage("no HTTP"), False)],
+)
+def test_errors_of_those_who_ask_are_not_logged(error: Exception, is_own: bool) -> None:
+    record = logging.LogRecord("x", logging.ERROR, "", 0, "", (), (type(error), error, None))
+    assert server._is_own_error(record) == is_own
+    record.exc_info = None
+    assert server._is_own_error(record)
