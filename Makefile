@@ -77,6 +77,9 @@ first-look: SEEDS = 10
 first-look: OUT = results/first-look
 first-look: $(STUDY)/installed
 	$(STUDY)/bin/swarm-logistics judge homing --seeds $(SEEDS) --out $(OUT)
+	@echo
+	@echo "Next: open $(OUT)/report.html; docs/indicators.md says how to read the verdicts."
+	@echo "A controller of your own: cd examples && ../$(STUDY)/bin/swarm-logistics judge wanderer:Wanderer"
 
 paper: $(STUDY)/installed
 	$(STUDY)/bin/swarm-logistics study run paper --seeds $(SEEDS) --out $(OUT)
