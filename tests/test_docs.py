@@ -158,9 +158,9 @@ def test_readme_runs_as_written() -> None:
     names = run(environment.replace("n_robots=25", "n_robots=25, duration=2.0"))
     assert len(names["observations"]) == 25
     assert all(names["truncations"].values())
-    circles = run(f"import numpy as np\n{controller}")["Circles"]
+    circles = run(controller)["Circles"]
     assert run_episode(Scenario(duration=2.0), circles(), seed=0).delivered == 0
-    assert "swarm-logistics judge wanderer:Wanderer" in README
+    assert "swarm-logistics judge my:Circles" in README
     example = (ROOT / "examples" / "wanderer.py").read_text(encoding="utf-8")
     assert example.partition("\n\n")[2] in PAGES["quickstart.md"]
     wanderer = run(example)["Wanderer"]

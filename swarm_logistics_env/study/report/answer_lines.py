@@ -190,10 +190,7 @@ def _counts(lines: Sequence[Line], *, names_subjects: bool) -> Iterator[str]:
 
 
 def in_short(lines: Sequence[Line]) -> str:
-    """Return what is decided of the indicators in plain words; empty: nothing is, or it is little.
-
-    FT says the same of faults as R, so it is left to its own sentence where both are asked.
-    """
+    """Return what is decided of the indicators in plain words; empty: nothing is, or it is one."""
     by_indicator: dict[str, list[Line]] = map_reduce(
         lines, lambda line: line.verdict.compared.indicator
     )
@@ -201,9 +198,8 @@ def in_short(lines: Sequence[Line]) -> str:
     for indicator, alike in by_indicator.items():
         definition = DEFINITIONS[indicator]
         usual = [line for line in alike if line.threshold == 0.0]
-        if indicator != "FT" or "R" not in by_indicator:
-            parts += _decided_in_words(usual, "refuted", definition.below, "worst")
-            parts += _decided_in_words(usual, "supported", definition.above, "least")
+        parts += _decided_in_words(usual, "refuted", definition.below, "worst")
+        parts += _decided_in_words(usual, "supported", definition.above, "least")
     if not parts or len(lines) == 1:
         return ""
     n_open = sum(line.verdict.conclusion == "open" for line in lines)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import SEEDS_OF_HEADLINE
 from swarm_logistics_env.study.tasks.task_world import counted_in
 from swarm_logistics_env.study.verdicts.cell import Cell
@@ -20,10 +21,10 @@ _FEW_ITEMS = 1.0  # in a run, of which shares say little
 _MOST_CONDITIONS = 2  # that a note of the answer names
 # What the words of verdicts mean: those that stand in an answer, in this order.
 _MEANINGS = {
-    "decided": "supported: above 0; refuted: below 0",
+    "decided": "supported: above 0{claims}; refuted: below 0",
     "compared": "more, less: of P than the policy behind 'against'",
     "open": "open, and no more: neither an effect is shown nor that there is none",
-    "margin": "P within {margin}: P is shown to change by less; in which direction is open",
+    "margin": "P within {margin}: P is shown to change by less than that, up or down",
     "stalls": "open, stalls: too few runs to rule out rare ones that deliver nearly nothing",
     "trainings": "open, trainings: too few trainings to rule out one that collapses",
     "Holm": "open, Holm: clear as the only question, not among all on the indicator",
@@ -104,9 +105,22 @@ def meanings(verdicts: Sequence[Verdict]) -> list[str]:
             else:
                 words.add(verdict.reason)
     of_words = (
-        meaning.format(margin=margin) for word, meaning in _MEANINGS.items() if word in words
+        meaning.format(margin=margin, claims=_claims(verdicts))
+        for word, meaning in _MEANINGS.items()
+        if word in words
     )
     return [*dict.fromkeys(verdict.at_zero for verdict in verdicts), *of_words]
+
+
+def _claims(verdicts: Sequence[Verdict]) -> str:
+    """Return what is claimed where an indicator is above 0, in words; empty: there are none."""
+    symbols = {verdict.compared.indicator for verdict in verdicts}
+    claims = [
+        f"{definition.above} ({symbol})"
+        for symbol, definition in DEFINITIONS.items()
+        if symbol in symbols and definition.above
+    ]
+    return f", that is {', '.join(claims)}" if claims else ""
 
 
 def _notes_that_apply(results: StudyResults) -> Iterator[str]:

@@ -18,7 +18,7 @@ from .figures import (
     policies_figure,
     trade_off_figure,
 )
-from .for_a_paper import PaperTables, in_a_sentence, paper_tables
+from .for_a_paper import PaperTables, in_a_sentence, paper_tables, world_in_words
 from .points import Point
 from .section import Figure, Section
 from .sentences import sentence, verdict_sections
@@ -43,6 +43,7 @@ class Document(NamedTuple):
 
     Attributes:
         text: the sentences below its heading, which the answer has.
+        world: where it was played, in words.
         answer: what the study found.
         points: the value of each line of the answer, as it is drawn.
         chapters: its parts, in order.
@@ -52,6 +53,7 @@ class Document(NamedTuple):
     """
 
     text: tuple[str, ...]
+    world: str
     answer: Answer
     points: tuple[Point, ...]
     chapters: tuple[Chapter, ...]
@@ -139,6 +141,7 @@ def document(results: StudyResults) -> Document:
     ]
     report = Document(
         text,
+        world_in_words(plan),
         study_answer,
         points,
         tuple(chapter for chapter in chapters if chapter.sections),

@@ -264,7 +264,7 @@ def _panel(results: StudyResults, verdicts: Sequence[Verdict], definition: Defin
 
 
 X_LABELS = {
-    "size": "swarm size N → N + m",
+    "size": "swarm size N",
     "fault": "failure mode and number m of faulty robots",
     "policy": "in its place",
 }
@@ -336,10 +336,12 @@ def _note(
     caps = f" {CAPPED}" if any(verdict.saturated for verdict in verdicts) else ""
     leaves = cuts_intervals(points, is_of_times=is_of_times)
     cut = ", with an arrow where they leave the axis" if leaves else ""
+    words = {verdict.in_words for verdict in verdicts if verdict.conclusion == "equivalent"}
+    small = "".join(f" or {word}" for word in sorted(words))
     return (
         f"{results.seeds_text.capitalize()}. Bars: {levels(verdicts)} intervals{cut}; filled: "
-        "decided by Holm's method; hollow: open, even where the bar lies beside a threshold; "
-        f"dashed: thresholds.{caps}"
+        f"decided by Holm's method; hollow: open{small}, even where the bar lies beside a "
+        f"threshold; dashed: thresholds.{caps}"
     )
 
 

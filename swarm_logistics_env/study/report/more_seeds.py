@@ -18,7 +18,7 @@ _NEEDS = {
     "within_reach": "{n_seeds} new {runs} might decide {them}",
     "beyond": "{reach} {runs} are too few for {them} ({named})",
     "none": "no number in reach will do for {them} ({named})",
-    "small": f"{{count}} of an effect below {EFFECT:g}, too small for more {{runs}}",
+    "small": f"the effect of {{count}} is likely below {EFFECT:g}, too small for more {{runs}}",
 }
 
 

@@ -92,7 +92,7 @@ class FailureMode:
 # FM3 as well: the paper's "cannot communicate with their neighbours". `FM3_isolated` loses both.
 FAILURE_MODES: dict[str, FailureMode] = {
     "FM1": FailureMode(
-        "always tells timer 0, as if in the delivery area",
+        "always tells timer 0, as if it were in the delivery area, so that others follow it",
         mark="1",
         title="false timer",
         honest=False,
