@@ -39,7 +39,8 @@ those of the searches that docs/research/tuning.md tells of.
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from collections.abc import Mapping
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,6 +133,13 @@ class HomingStockParameters(DrivingParameters):
         description="for how long it carries the requested item outside, and then leaves it to "
         "others [s]; 0: for ever",
     )
+
+    # What the search of `research/search_again.py` found in `dotbots`.
+    of_small_robots: ClassVar[Mapping[str, float]] = {
+        "near": 2.2, "density": 1.264, "holders": 1.323, "patience": 0.967, "spread_gain": 0.417,
+        "spread_range": 0.921, "avoid_gain": 0.351, "avoid_range": 0.394, "clearance": 0.938,
+        "obstacle_range": 0.554,
+    }  # fmt: skip
 
 
 Parameters = HomingStockParameters.for_kernels()

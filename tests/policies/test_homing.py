@@ -166,7 +166,7 @@ def test_a_stock_is_the_deeper_the_more_items_there_are_if_lifting_takes_time(
         ({"max_speed": 1.0, "max_acceleration": 2.0}, 0.5648),
         ({"max_speed": 2.0, "max_acceleration": 0.5}, 0.0),
         ({"max_acceleration": 2.0, "n_requests": 2}, 0.6898),
-        ({"robot_radius": 0.05, "n_requests": 2}, 0.27592),
+        ({"robot_radius": 0.05, "n_requests": 2}, 2.2 * 0.27592),
         ({"max_acceleration": 2.0, "handling_time": 1.0}, 60 / 8.709),
     ],
 )
@@ -188,12 +188,15 @@ def values_by_radius(name: str, *radii: float, **parameters: Any) -> list[dict[s
     return values
 
 
-def test_every_length_of_a_stock_goes_with_the_radius_and_nothing_else_does() -> None:
-    fitted, small = values_by_radius("homing-stock", 0.125, 0.05)
+def test_every_length_of_a_stock_goes_with_the_radius_and_nothing_else_does_above_0_125_m() -> None:
+    large, fitted, small = values_by_radius("homing-stock", 0.25, 0.125, 0.05)
     lengths = {name for name in fitted if name.endswith("_range")} | {"clearance", "near"}
-    changed = {name for name in fitted if small[name] != fitted[name]}
+    changed = {name for name in fitted if large[name] != fitted[name]}
     assert changed == lengths & fitted.keys()
-    assert all(small[name] == pytest.approx(0.4 * fitted[name]) for name in changed)
+    assert all(large[name] == pytest.approx(2.0 * fitted[name]) for name in changed)
+    # Robots that are smaller have other parameters, too.
+    assert small["avoid_gain"] == pytest.approx(0.351 * fitted["avoid_gain"])
+    assert small["near"] == pytest.approx(0.4 * 2.2 * fitted["near"])
 
 
 def test_homing_has_other_parameters_for_small_robots_and_goes_to_them_by_a_power() -> None:
