@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, run_episode
 from swarm_logistics_env.policies import load
+from swarm_logistics_env.policies.homing import HomingParameters
 from swarm_logistics_env.policies.homing_stock import Parameters
 from swarm_logistics_env.world import observations as row
 
@@ -205,8 +206,10 @@ def test_homing_has_other_parameters_for_small_robots_and_goes_to_them_by_a_powe
     )
     policy: Any = load("homing")
     assert fitted == dict(policy.parameters)
-    assert small["spread_gain"] == pytest.approx(0.8703, rel=1e-3)
-    assert small["spread_range"] == pytest.approx(0.4 * 2.522, rel=1e-3)
+    factors = HomingParameters.of_small_robots
+    assert small["spread_gain"] == pytest.approx(factors["spread_gain"] * fitted["spread_gain"])
+    expected = 0.4 * factors["spread_range"] * fitted["spread_range"]
+    assert small["spread_range"] == pytest.approx(expected)
     assert small["grip_range"] == pytest.approx(0.4 * fitted["grip_range"])
     assert small["home_share"] == fitted["home_share"]
     # The geometric mean of both radii has that of both values.

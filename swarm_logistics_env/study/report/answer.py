@@ -75,8 +75,8 @@ class Answer(NamedTuple):
         undecided = f"None of {len(self.lines)} questions is decided." if is_open else ""
         several = len(self.subjects) > 1
         scope = self.scope if several else ""
-        short = "" if several else in_short(self.lines)
-        return [*filter(None, [undecided, short, self.comparison, scope])]
+        short = [] if several else in_short(self.lines)
+        return [*filter(None, [undecided, *short, self.comparison, scope])]
 
     @property
     def summary(self) -> list[str]:

@@ -189,8 +189,8 @@ def _counts(lines: Sequence[Line], *, names_subjects: bool) -> Iterator[str]:
         yield f"{len(alike)} {decision} ({details})" if details else f"{len(alike)} {decision}"
 
 
-def in_short(lines: Sequence[Line]) -> str:
-    """Return what is decided of the indicators in plain words; empty: nothing is, or it is one."""
+def in_short(lines: Sequence[Line]) -> list[str]:
+    """Return what is decided of the indicators in plain sentences; none where one is asked."""
     by_indicator: dict[str, list[Line]] = map_reduce(
         lines, lambda line: line.verdict.compared.indicator
     )
@@ -201,10 +201,11 @@ def in_short(lines: Sequence[Line]) -> str:
         parts += _decided_in_words(usual, "refuted", definition.below, "worst")
         parts += _decided_in_words(usual, "supported", definition.above, "least")
     if not parts or len(lines) == 1:
-        return ""
+        return []
     n_open = sum(line.verdict.conclusion == "open" for line in lines)
-    left = f" {n_open} of {len(lines)} questions are open." if n_open else ""
-    return f"In short: {'; '.join(parts)}.{left}"
+    parts += [f"{n_open} of {len(lines)} questions are open"] if n_open else []
+    first, *others = parts
+    return [f"In short: {first}.", *(f"{part[0].upper()}{part[1:]}." for part in others)]
 
 
 def _decided_in_words(
@@ -215,5 +216,6 @@ def _decided_in_words(
     if decided and meaning:
         lowest = min(decided, key=lambda line: line.verdict.value or 0.0)
         where = f"{lowest.name(with_subject=False)}: {lowest.p}"
-        count = f" in {len(decided)} of {len(lines)} questions" if len(lines) > 1 else ""
-        yield f"{meaning}{count} ({extreme} at {where})" if count else f"{meaning} ({where})"
+        if len(lines) > 1:
+            where = f"in {len(decided)} of {len(lines)} questions, {extreme} at {where}"
+        yield f"{meaning}, {where}"

@@ -24,7 +24,8 @@ _MEANINGS = {
     "decided": "supported: above 0{claims}; refuted: below 0",
     "compared": "more, less: of P than the policy behind 'against'",
     "open": "open, and no more: neither an effect is shown nor that there is none",
-    "margin": "P within {margin}: P is shown to change by less than that, up or down",
+    "margin": "P within {margin}: P is shown to change by less than that, up or down; of FT from "
+    "removed robots to faulty ones",
     "stalls": "open, stalls: too few runs to rule out rare ones that deliver nearly nothing",
     "trainings": "open, trainings: too few trainings to rule out one that collapses",
     "Holm": "open, Holm: clear as the only question, not among all on the indicator",

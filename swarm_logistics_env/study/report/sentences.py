@@ -106,7 +106,10 @@ def _parts(results: StudyResults, verdict: Verdict) -> Iterator[str]:
         plain, adjusted = verdict.on_equivalence
         words = plain if plain == adjusted else f"{plain} ({adjusted} under Holm)"
         change = _change(verdict.equivalence.change, verdict.margin)
-        yield f"{verdict.equivalence_name}? Change {change}: {words}."
+        limits_of_change = verdict.equivalence.change.low, verdict.equivalence.change.high
+        is_within = all(x is not None and abs(x) < verdict.margin for x in limits_of_change)
+        why = ", as some runs may stall" if plain == "open" and is_within else ""
+        yield f"{verdict.equivalence_name}? Change {change}: {words}{why}."
     yield from (_FLAGS[flag] for flag in verdict.flags)
     if estimate.collapsed is not None:
         yield f"Trainings: {estimate.collapsed}."

@@ -110,7 +110,7 @@ def _standstills(cell: Cell) -> str:
     longest = cell.mean_of("longest_standstill")
     if longest is None:
         return NOTHING
-    return f"{_percent_of(cell, 'stands_still')} (longest {longest:.0f} s)"
+    return f"{_percent_of(cell, 'stands_still')} (longest wait {longest:.0f} s in the mean)"
 
 
 def _percent_of(cell: Cell, measure: str) -> str:

@@ -49,7 +49,7 @@ class Fault(Record):
         onset: when it begins [s], from the start of the episode.
         duration: for how long it holds [s]; None: for good. A removed robot does not come back.
             Robots that are `late` begin to work when it ends, and those that are `away` come back.
-        factor: for `motor_slow`, `motor_wear` and `view_reduced`: what is left, in [0, 1).
+        factor: for a mode whose `factor` names something: what is left of it, in [0, 1).
         intermittent: for how long [s] it holds, and for how long not, both on average, in turn
             from its onset on; each robot's times are drawn from its own stream (exponential).
             None: it holds without a break.

@@ -47,12 +47,12 @@ def test_every_question_has_a_row_with_its_numbers_and_one_word(few: StudyResult
 
 
 def test_the_head_says_p_and_each_indicator_with_its_worst_value(stopped: StudyResults) -> None:
-    short, performance, robustness = answer(stopped).head
+    short, still_open, performance, robustness = answer(stopped).head
     assert short.startswith(
-        "In short: faulty robots cost more than their share in 2 of 3 questions (worst at FM4 no "
+        "In short: faulty robots cost more than their share, in 2 of 3 questions, worst at FM4 no "
         "delivery, 1 of 25: P 3"
     )
-    assert short.endswith(" 1 of 3 questions are open.")
+    assert still_open == "1 of 3 questions are open."
     assert performance.startswith("swarm-dt: P [95 %] = ")
     assert " items in 500 s, N = 25, no fault; 60 paired seeds (0 to 59)." in performance
     lowest = min(stopped.verdicts, key=lambda verdict: verdict.value or 0.0)
