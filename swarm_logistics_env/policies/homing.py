@@ -65,7 +65,7 @@ class HomingParameters(DrivingParameters):
     clearance: Clearance = 0.2135
     obstacle_range: ObstacleRange = 0.6606
 
-    # What the search of `research/search_again.py` found in `dotbots`, begun twice.
+    # What two searches of `research/search_again.py` found in `dotbots`, one after the other.
     of_small_robots: ClassVar[Mapping[str, float]] = {
         "spread_gain": 11.1, "spread_range": 0.445, "avoid_gain": 0.212, "avoid_range": 0.858,
         "wall_gain": 0.233, "wall_range": 1.1, "sure": 1.94, "clearance": 1.22,

@@ -13,8 +13,8 @@ Robots sense and remember what those of `homing` do, and six simple mechanisms a
 * A laden robot that stands still goes in a random direction, not away from home, for a moment.
 * A robot that never entered the area goes to the lowest timer heard.
 
-The lengths among the parameters go with the radius of the robots. Three parameters keep the swarm
-going where lifting takes time:
+Parameters go with the radius of the robots, see `ScriptParameters.scaled_to`. Three of them keep
+the swarm going where lifting takes time:
 
 * `density`: the more items there are, the deeper is the stock. A shallow one of many items is a
   wall: laden robots do not get through, least in the corners beside the area. Where lifting takes

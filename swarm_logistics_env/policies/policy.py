@@ -84,7 +84,7 @@ class Described:
 
 
 FITTED_RADIUS = 0.125  # of the robots for which parameters were fitted [m]
-FITTED_SPEED = 1.0  # their top speed [m/s]
+FITTED_SPEED = 1.0  # from which on `of_fast_robots` begins to act [m/s]
 SMALL_RADIUS = 0.05  # of those for which `of_small_robots` was: DotBots [m]
 HIGH_SPEED = 2.0  # of those for which `of_fast_robots` was: the paper's [m/s]
 
@@ -119,11 +119,11 @@ class ScriptParameters(Record):
         return tuple(dict(self).values())
 
     def scaled_to(self, swarm: Scenario) -> Self:
-        """Return these for robots as large and as fast as these.
+        """Return these for robots as large and as fast as the largest and the fastest of a swarm.
 
         Lengths go with the radius; those that were published stay. Between 0.125 m and 0.05 m a
         parameter goes with the power of the radius that leads to `of_small_robots`, and between
-        1 m/s and 2 m/s with that of the speed that leads to `of_fast_robots`.
+        1 m/s and 2 m/s with that of the speed that leads to `of_fast_robots`; beyond, they stay.
         """
         scale = swarm.robot_radius / FITTED_RADIUS
         factors = {
@@ -132,11 +132,16 @@ class ScriptParameters(Record):
             if field.description and "[m]" in field.description
             if "source" not in field.description
         }
-        smallness = _way(FITTED_RADIUS, swarm.robot_radius, SMALL_RADIUS)
-        speed = _way(FITTED_SPEED, swarm.max_speed, HIGH_SPEED)
-        for way, changes in ((smallness, self.of_small_robots), (speed, self.of_fast_robots)):
+        share_of_small = _way(FITTED_RADIUS, swarm.robot_radius, SMALL_RADIUS)
+        # A contract lists the fields that a policy reads: of robots of one kind the plain one.
+        top_speed = swarm.highest_speed if swarm.robot_kinds else swarm.max_speed
+        share_of_fast = _way(FITTED_SPEED, top_speed, HIGH_SPEED)
+        for share, changes in (
+            (share_of_small, self.of_small_robots),
+            (share_of_fast, self.of_fast_robots),
+        ):
             for name, change in changes.items():
-                factors[name] = change**way * factors.get(name, 1.0)
+                factors[name] = change**share * factors.get(name, 1.0)
         return self.model_copy(
             update={name: factor * getattr(self, name) for name, factor in factors.items()}
         )

@@ -20,7 +20,8 @@ search alone. Any item may be asked for next, so each that lies around a site is
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, NamedTuple
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,8 @@ class SiteFidelityParameters(HomingParameters):
 
     A step is 0.08 m at top speed.
     """
+
+    of_small_robots: ClassVar[Mapping[str, float]] = {}  # those of `Homing` are of its own search
 
     search_rate: Probability = Field(
         0.504, description="probability to begin the search, a step of the way out; source"

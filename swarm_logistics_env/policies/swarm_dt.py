@@ -70,7 +70,7 @@ class SwarmDTParameters(ScriptParameters):
         "each other; source: simulator",
     )
     scales: bool = Field(
-        False, description="whether they go with the radius and the top speed of robots; fitted"
+        False, description="whether all go with the radius and the top speed of robots; fitted"
     )
 
     # What the search of `research/search_again.py` found in `dotbots`.

@@ -180,7 +180,7 @@ def test_the_tuned_one_alone_goes_with_the_radius_and_the_speed_of_the_robots() 
         parameter: factor * (0.4 if parameter in lengths else 1.0)
         for parameter, factor in SwarmDTParameters.of_small_robots.items()
     }
-    changes = [{}, of_small, dict(SwarmDTParameters.of_fast_robots), {}]
+    changes = [{}, of_small, dict(SwarmDTParameters.of_fast_robots), {}, {}]
     for name in ("swarm-dt-tuned", "swarm-dt"):
         policy: Any = load(name)
         for changed, factors in zip(fields, changes):

@@ -16,6 +16,7 @@ from swarm_logistics_env.spi.definitions import (
 from swarm_logistics_env.spi.estimate import Estimate, Options
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.study.tasks.task import Case
+from swarm_logistics_env.study.tasks.task_world import world_of
 
 CONFIDENCE = 0.95  # of intervals and verdicts, unless a look of a study makes it larger
 
@@ -138,9 +139,8 @@ class Comparison:
             return f"to {after.name}, {after.condition}"
         if after.kind == "fault":
             start = f" from {after.onset:g} s" if after.onset else ""
-            text = self.original.case.task.failure_modes.get(after.name, "")
-            title = f" {text.partition(': ')[0]}" if ": " in text else ""
-            return f"{after.name}{title}{start}, {after.value:g} of {self.n_robots}"
+            mode = f"{after.name} {world_of(self.original.case.task).mode_title(after.name)}"
+            return f"{mode.rstrip()}{start}, {after.value:g} of {self.n_robots}"
         if after.kind == "policy":
             return f"with {after.name}"
         name = "N" if after.kind == "size" else after.name

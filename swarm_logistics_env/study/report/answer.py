@@ -69,7 +69,7 @@ class Answer(NamedTuple):
 
     @property
     def opening(self) -> list[str]:
-        """The sentences before the overview: what is compared, and how much was asked."""
+        """The sentences before the overview: what is decided, compared, and how much was asked."""
         words = {line.verdict.conclusion for line in self.lines}
         is_open = len(self.lines) > 1 and words <= {"open", UNTESTABLE}
         undecided = f"None of {len(self.lines)} questions is decided." if is_open else ""

@@ -24,10 +24,10 @@ class Line(NamedTuple):
 
     Attributes:
         subject: whose swarm it is about, and in which task where there are several.
-        question: indicator and what is changed, e.g. "R FM4, 1 of 25".
+        question: indicator and what is changed, e.g. "R FM4 no delivery, 1 of 25".
         verdict: on it.
         number: the index of the verdict among those of the study.
-        p: mean P before and after, of FT without the robots and with them; empty: not played.
+        p: mean P before and after, of FT with the robots removed and faulty; empty: not played.
     """
 
     subject: str
@@ -178,7 +178,7 @@ def _counts(lines: Sequence[Line], *, names_subjects: bool) -> Iterator[str]:
     )
     for word in sorted(by_word, key=section.rank_of_word):
         alike = by_word[word]
-        if word == "equivalent":
+        if alike[0].verdict.conclusion == "equivalent":
             yield f"{len(alike)} with {alike[0].verdict.in_words}"
             continue
         names = [line.name(with_subject=names_subjects) for line in alike]
@@ -203,7 +203,8 @@ def in_short(lines: Sequence[Line]) -> list[str]:
     if not parts or len(lines) == 1:
         return []
     n_open = sum(line.verdict.conclusion == "open" for line in lines)
-    parts += [f"{n_open} of {len(lines)} questions are open"] if n_open else []
+    are = "is" if n_open == 1 else "are"
+    parts += [f"{n_open} of {len(lines)} questions {are} open"] if n_open else []
     first, *others = parts
     return [f"In short: {first}.", *(f"{part[0].upper()}{part[1:]}." for part in others)]
 

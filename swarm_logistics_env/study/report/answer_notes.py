@@ -66,9 +66,7 @@ def _modes(results: StudyResults) -> str:
     faults = [verdict.after.name for verdict in results.verdicts if verdict.after.kind == "fault"]
     modes = {mode for fault in faults for mode in fault.split("+")}
     described = results.plan.specification.played.failure_modes
-    texts = [
-        f"{mode}: {text.rpartition(': ')[2]}" for mode, text in described.items() if mode in modes
-    ]
+    texts = [f"{mode}: {text}" for mode, text in described.items() if mode in modes]
     return f"A faulty robot: {'; '.join(texts)}" if texts else ""
 
 
@@ -98,13 +96,11 @@ def meanings(verdicts: Sequence[Verdict]) -> list[str]:
                 words.add("provisional")
         elif word == UNTESTABLE:
             words.add(verdict.flags[0])
+        elif verdict.conclusion == "equivalent":
+            words.add("margin")
+            margin = f"{100 * verdict.margin:.3g} %"
         else:
-            words.add(word)
-            if verdict.conclusion == "equivalent":
-                words.add("margin")
-                margin = f"{100 * verdict.margin:.3g} %"
-            else:
-                words.add(verdict.reason)
+            words.add(verdict.reason or word)
     of_words = (
         meaning.format(margin=margin, claims=_claims(verdicts))
         for word, meaning in _MEANINGS.items()
@@ -114,8 +110,12 @@ def meanings(verdicts: Sequence[Verdict]) -> list[str]:
 
 
 def _claims(verdicts: Sequence[Verdict]) -> str:
-    """Return what is claimed where an indicator is above 0, in words; empty: there are none."""
-    symbols = {verdict.compared.indicator for verdict in verdicts}
+    """Return what it means that those that are decided are above 0; empty: there are no words."""
+    symbols = {
+        verdict.compared.indicator
+        for verdict in verdicts
+        if verdict.conclusion in ("supported", "refuted")
+    }
     claims = [
         f"{definition.above} ({symbol})"
         for symbol, definition in DEFINITIONS.items()

@@ -43,7 +43,7 @@ class Document(NamedTuple):
 
     Attributes:
         text: the sentences below its heading, which the answer has.
-        world: where it was played, in words.
+        world: where it was played, in words; empty: trials say it themselves.
         answer: what the study found.
         points: the value of each line of the answer, as it is drawn.
         chapters: its parts, in order.
@@ -141,7 +141,7 @@ def document(results: StudyResults) -> Document:
     ]
     report = Document(
         text,
-        world_in_words(plan),
+        "" if plan.origin else world_in_words(plan),
         study_answer,
         points,
         tuple(chapter for chapter in chapters if chapter.sections),

@@ -54,7 +54,7 @@ def more_seeds(results: StudyResults) -> MoreSeeds:
     words = [
         template.format(
             count=len(needs[case]),
-            them="them" if len(needs) == 1 else len(needs[case]),
+            them=_pronoun(needs[case]) if len(needs) == 1 else len(needs[case]),
             n_seeds=most,
             runs=runs,
             reach=reach,
@@ -82,6 +82,10 @@ def _need(verdict: Verdict, reach: int) -> tuple[str, int | None]:
     # Rounded up, as looks are at whole tens.
     n_seeds = 10 * math.ceil(n_seeds / 10)
     return ("within_reach" if n_seeds <= reach else "beyond"), n_seeds
+
+
+def _pronoun(questions: Sequence[object]) -> str:
+    return "it" if len(questions) == 1 else "them"
 
 
 def _named(questions: Sequence[tuple[Verdict, int | None]]) -> str:

@@ -41,7 +41,7 @@ _FLAGS = {
 _STOPS = {
     "clear": ("Clear at", ""),
     "hardly": ("Open after", ": the others would hardly decide it"),
-    "margin": ("Open after", ": P changes by less than the margin"),
+    "margin": ("Stopped after", ": P changes by less than the margin"),
     "most": ("Open after", ""),
 }
 

@@ -86,10 +86,7 @@ class Task(Protocol):
 
     @property
     def failure_modes(self) -> Mapping[str, str]:
-        """The failure modes, each with what it does to a robot, perhaps as "title: text".
-
-        A table of verdicts has the title behind the mode's name.
-        """
+        """The failure modes, each with what it does to a robot."""
 
     def code(self) -> str:
         """Return a text that changes whenever the task's runs may have changed."""

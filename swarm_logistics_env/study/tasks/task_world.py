@@ -36,6 +36,10 @@ class TaskWorld:
         """Return the largest P that a run can have; infinite: none is."""
         return math.inf
 
+    def mode_title(self, mode: str) -> str:
+        """Return a failure mode in two words, for tables of verdicts; empty: its name says it."""
+        return ""
+
     def check_faults(self, scenario: TaskScenario, faults: Sequence[TaskFault]) -> None:
         """Raise a SwarmLogisticsError if a fault names robots that a scenario has not."""
 

@@ -62,11 +62,8 @@ class WarehouseTask(TaskWorld):
 
     @property
     def failure_modes(self) -> dict[str, str]:
-        """The failure modes of `FAILURE_MODES`, each with its title and what it does to a robot."""
-        return {
-            name: f"{mode.title}: {mode.description}" if mode.title else mode.description
-            for name, mode in FAILURE_MODES.items()
-        }
+        """The failure modes of `FAILURE_MODES`, each with what it does to a robot."""
+        return {mode: FAILURE_MODES[mode].description for mode in FAILURE_MODES}
 
     def code(self) -> str:
         """Return the digest of the code that decides an episode, 16 hexadecimal digits.
@@ -112,6 +109,10 @@ class WarehouseTask(TaskWorld):
             **asdict(episode.contacts),
             **asdict(episode.orders),
         )
+
+    def mode_title(self, mode: str) -> str:
+        """Return `FailureMode.title`."""
+        return FAILURE_MODES[mode].title if mode in FAILURE_MODES else ""
 
     def world_in_words(self, scenario: TaskScenario) -> str:
         """Return size, items and robots of the warehouse."""

@@ -19,9 +19,8 @@ from swarm_logistics_env.core.current_folder import search_current_folder
 from swarm_logistics_env.core.errors import SwarmLogisticsError
 from swarm_logistics_env.core.records import plain
 
-from .output import BAD_INPUT, DONE, FAILED, STOPPED, prepare_output
+from .output import BAD_INPUT, DONE, FAILED, PROGRAM, STOPPED, prepare_output
 
-PROGRAM = "swarm-logistics"
 # In the order of use, as the help shows them. A module is imported when its command is called.
 COMMANDS = {
     "watch": ("playing", "watch_command"),

@@ -9,6 +9,8 @@ import os
 import sys
 from typing import Any, TextIO
 
+PROGRAM = "swarm-logistics"
+
 # What a command ends with.
 DONE = 0
 FAILED = 1

@@ -34,6 +34,8 @@ from swarm_logistics_env.study.runs.engines import Tally
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import POWER, Verdict
 
+from .output import PROGRAM
+
 
 def show(section: Section) -> None:
     """Print one section."""
@@ -57,9 +59,8 @@ def show(section: Section) -> None:
 
 def program() -> str:
     """Return what to type for this program: its name, or its path where no shell finds the name."""
-    name = "swarm-logistics"
-    is_path = Path(sys.argv[0]).name == name and which(name) is None
-    return quote(sys.argv[0]) if is_path else name
+    is_script = Path(sys.argv[0]).stem in (PROGRAM, f"{PROGRAM}-env")
+    return quote(sys.argv[0]) if is_script and which(PROGRAM) is None else PROGRAM
 
 
 def say(text: str, command: str = "") -> None:

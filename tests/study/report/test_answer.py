@@ -12,6 +12,7 @@ import pytest
 
 from swarm_logistics_env import judge as judge_trials
 from swarm_logistics_env import spi
+from swarm_logistics_env.study import Study
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.answer_lines import Line
 from swarm_logistics_env.study.report.more_seeds import more_seeds
@@ -19,7 +20,7 @@ from swarm_logistics_env.study.report.section import limits, percent
 from swarm_logistics_env.study.report.terminal_answer import terminal_answer
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import Decision
-from tests.made_up import decided, paper
+from tests.made_up import decided, delivered, judged, paper
 
 pytestmark = pytest.mark.unmeasured
 
@@ -52,7 +53,7 @@ def test_the_head_says_p_and_each_indicator_with_its_worst_value(stopped: StudyR
         "In short: faulty robots cost more than their share, in 2 of 3 questions, worst at FM4 no "
         "delivery, 1 of 25: P 3"
     )
-    assert still_open == "1 of 3 questions are open."
+    assert still_open == "1 of 3 questions is open."
     assert performance.startswith("swarm-dt: P [95 %] = ")
     assert " items in 500 s, N = 25, no fault; 60 paired seeds (0 to 59)." in performance
     lowest = min(stopped.verdicts, key=lambda verdict: verdict.value or 0.0)
@@ -168,3 +169,23 @@ def test_one_question_at_two_values_of_a_parameter_names_them() -> None:
     questions = answer(judge_trials(frame)).questions
     sizes = [question for question in questions if question.startswith("S ")]
     assert sizes == ["S N 4→8, speed = 0.5", "S N 4→8, speed = 1"]
+
+
+def test_a_small_change_has_the_same_words_in_the_sentence_and_its_row_below_ten_seeds() -> None:
+    faults = [{"modes": ["FM2", "FM3"], "robots": [1]}]
+    study = Study(policies=["homing"], seeds=8, faults=faults, indicators=["R"])
+    few = judged(
+        study, lambda _, setting, seed: delivered(400 + (seed * 7 + int(setting.value)) % 5)
+    )
+    lines = answer(few).lines
+    assert {line.verdict.conclusion for line in lines} == {"equivalent"}
+    assert {line.verdict.in_words for line in lines} == {"P within 10 %"}
+    assert answer(few).head[-1].startswith("Robustness R: 2 with P within 10 %; lowest at ")
+    assert not any("open" in note for note in answer(few).notes)
+
+
+def test_modes_without_a_title_are_named_alone() -> None:
+    study = Study(policies=["homing"], seeds=2, faults=[{"modes": ["late"]}], indicators=["R"])
+    made = answer(judged(study, lambda *_: delivered(20)))
+    assert [line.question for line in made.lines] == [f"R late, {m} of 25" for m in (1, 2, 3)]
+    assert any("late: has not begun to work: stands as a dead" in note for note in made.notes)
