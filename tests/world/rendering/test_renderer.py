@@ -18,8 +18,8 @@ from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.world.rendering import Renderer, palette
 from swarm_logistics_env.world.warehouse import FAILURE_MODES, WarehouseState
-from swarm_logistics_env.world.warehouse.orders import DUE
 from swarm_logistics_env.world.warehouse.state import CARRIED, DELIVERED, NOBODY
+from swarm_logistics_env.world.warehouse.structs import DUE
 
 Frame = NDArray[np.uint8]
 FROZEN = Path(__file__).parents[2] / "frozen"
