@@ -44,6 +44,7 @@ class Answer(NamedTuple):
 
     Attributes:
         title: the study's name with its policies in front of it.
+        policies: their names, as a list in words.
         comparison: by which factor P of two policies differs; empty: they are not compared.
         overview: P of each policy and task where there are many, and how that compares; None:
             there are few, and each has sentences of its own.
@@ -57,6 +58,7 @@ class Answer(NamedTuple):
     """
 
     title: str
+    policies: str
     comparison: str
     overview: Section | None
     turns: str
@@ -152,6 +154,7 @@ def answer(results: StudyResults) -> Answer:
         subjects = (SubjectAnswer(policies, "P: no run has succeeded", section.NOTHING, "", ()),)
     return Answer(
         _title(results, policies),
+        policies,
         compared.sentence,
         _overview(results, subjects, compared.factors),
         compared.turns,

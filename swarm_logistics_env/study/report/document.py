@@ -18,7 +18,7 @@ from .figures import (
     policies_figure,
     trade_off_figure,
 )
-from .for_a_paper import PaperTables, in_a_sentence, paper_tables, world_in_words
+from .for_a_paper import PaperTables, in_a_sentence, paper_tables
 from .points import Point
 from .section import Figure, Section
 from .sentences import sentence, verdict_sections
@@ -43,7 +43,6 @@ class Document(NamedTuple):
 
     Attributes:
         text: the sentences below its heading, which the answer has.
-        world: where it was played, in words; empty: trials say it themselves.
         answer: what the study found.
         points: the value of each line of the answer, as it is drawn.
         chapters: its parts, in order.
@@ -53,7 +52,6 @@ class Document(NamedTuple):
     """
 
     text: tuple[str, ...]
-    world: str
     answer: Answer
     points: tuple[Point, ...]
     chapters: tuple[Chapter, ...]
@@ -107,9 +105,10 @@ def document(results: StudyResults) -> Document:
     paper_sections = tuple(cell_tables(results, for_paper=True))
     further = tuple(further_tables(results))
     methods_section = Section("", lines=(methods(plan, results.looks),))
+    set_up = setup_sheet(plan)
+    paper = paper_tables(results, study_answer, (*paper_sections, *further, *of_faults))
     has_values = any(verdict.estimate for verdict in results.verdicts)
     quotable = (Section("", lines=(in_a_sentence(results, study_answer),)),) if has_values else ()
-    set_up = setup_sheet(plan)
     chapters = [
         Chapter("Warnings", "", (Section("Warnings", lines=lines),) if lines else ()),
         Chapter(
@@ -141,11 +140,10 @@ def document(results: StudyResults) -> Document:
     ]
     report = Document(
         text,
-        "" if plan.origin else world_in_words(plan),
         study_answer,
         points,
         tuple(chapter for chapter in chapters if chapter.sections),
-        paper_tables(results, study_answer, (*paper_sections, *further, *of_faults)),
+        paper,
         runs,
         results.cell_table,
         results.verdict_table,

@@ -99,7 +99,7 @@ def in_a_sentence(results: StudyResults, answer: Answer) -> str:
     place = "," if results.plan.origin else " in"
     world = f"{world_in_words(results.plan)}{_preset_and_engine(results.plan)}"
     sentences = [
-        f"{section.join_names(results.policies)}{place} {world}, {results.seeds_text}",
+        f"{answer.policies}{place} {world}, {results.seeds_text}",
     ]
     if answer.comparison:
         sentences.append(answer.comparison.removesuffix("."))
@@ -111,7 +111,7 @@ def in_a_sentence(results: StudyResults, answer: Answer) -> str:
     if answer.level != section.P_LEVEL:
         method += f"; intervals of indicators of {answer.level} unless said otherwise"
     if results.looks:
-        looks = section.join_names([*map(str, results.looks)])
+        looks = ", ".join(map(str, results.looks))
         questions = section.plural(len(results.verdicts), "question")
         method += f"; looked at after {looks} seeds: of {questions} {_stops(results)}"
     if results.exploratory:

@@ -161,7 +161,7 @@ def test_a_paper_is_told_conditions_seeds_and_why_each_question_was_played_no_fu
     counts = f"1 refuted ({worst}), 1 with P within 10 %"
     assert f"; robustness R: {counts}; lowest at {worst}: P 3" in sentence
     assert sentence.endswith(
-        "looked at after 10, 20, 30, 40, 50 and 60 seeds: of 2 questions 1 stopped where clear, "
+        "looked at after 10, 20, 30, 40, 50, 60 seeds: of 2 questions 1 stopped where clear, "
         "1 after all 60 seeds."
     )
 

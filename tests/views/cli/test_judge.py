@@ -111,17 +111,15 @@ def test_trials_are_judged_and_what_is_written_is_told(command: Command) -> None
     performance = (
         "P (boxes) [95 %] = 12.3 [9.9, 14.6], N = 8, no fault; robustness R, wheel, 1 of 8: "
     )
-    paper = "lab, trials of lab.csv, robots 8, floor tiles, 3 unpaired runs a condition. "
     out = Path("results", "judged", "lab")
     assert f"Report: {out / 'report.html'}\n" in printed
-    assert (
-        f"Figure: {out / 'figures' / 'answer.svg'}\nTables for a paper: {out / 'tables.tex'}\n"
-        in printed
-    )
+    figure = out / "figures" / "answer.svg"
+    assert f"Figure: {figure}\nTables for a paper: {out / 'tables.tex'}\n" in printed
     for name in ("report.html", "claims.csv", "figures/answer.svg"):
         assert (out / name).is_file()
     report = (out / "report.md").read_text()
-    assert f"{paper}lab: {performance}" in report
+    conditions = "trials of lab.csv, robots 8, floor tiles, 3 unpaired runs a condition"
+    assert f"lab, {conditions}. lab: {performance}" in report
     assert "| robots | 8 |\n| floor | tiles |" in report
     # With other words on the conditions they are another study beside it.
     assert "so this one is in results/judged/lab-2" in command(TRIALS)
