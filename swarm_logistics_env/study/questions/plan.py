@@ -147,11 +147,13 @@ class Plan:
 
     def __str__(self) -> str:
         n_cases = len(self.cases)
+        n_questions = len(self.comparisons)
+        questions = "1 question" if n_questions == 1 else f"{n_questions} questions"
         start = self.specification.first_seed
         first = f" from {start} on" if start else ""
         most = "at most " if self.specification.until_clear else ""
         return (
-            f"{self.specification.name}: {len(self.comparisons)} questions; {n_cases} conditions x "
+            f"{self.specification.name}: {questions}; {n_cases} conditions x "
             f"{most}{len(self.seeds)} seeds{first} = {most}{n_cases * len(self.seeds)} runs"
         )
 
