@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -175,17 +176,31 @@ def test_shares_and_survivors_are_told(
         is_right = names["is_large"](4.0) and not names["is_large"](3.0)
         return "" if is_right else f"{MIRROR}::test_three_is_not_large"
 
+    def type_errors(copy: Path) -> Counter[str]:
+        text = (copy / PACKAGE / "old/sizes.py").read_text("utf-8")
+        return Counter(["an old one", *(["no bool"] if "not number < 1.0" in text else [])])
+
     monkeypatch.setattr(sampling, "run_tests", run_tests)
+    monkeypatch.setattr(sampling, "type_errors", type_errors)
     borrowed = copies.Copies(1, tree, tree.parent / "copies")
     package = sampling.Package(tree, ["sizes"])
-    assert sampling.measure_sample(99, 0, package, borrowed, 1, 60.0) == 0
-    *_, total, first, second, third, _, _ = capsys.readouterr().out.splitlines()
-    assert total == "all: 3 of 6 survive, 50.0% [18.8%, 81.2%]"
+
+    def measure() -> list[str]:
+        record = sampling.Made(tree / "made.jsonl", "this tree")
+        assert sampling.measure_sample(99, 0, package, borrowed, 1, 60.0, record) == 0
+        return capsys.readouterr().out.splitlines()
+
+    *made, total, by_tests, first, second, _, _ = measure()
+    assert total == "all: 2 of 6 survive, 33.3% [9.7%, 70.0%]"
+    assert by_tests == "tests alone: 3 of 6 survive, 50.0% [18.8%, 81.2%]"
     assert first.startswith("SURVIVES old/sizes.py:9 1.0 -> ")
     assert second.startswith("SURVIVES old/sizes.py:9 number < 1.0 -> number ")
-    assert third.startswith(
-        "SURVIVES old/sizes.py:9 return number < 1.0 -> return not number < 1.0"
-    )
+    assert sum(line.endswith(": mypy: no bool") for line in made) == 1
+    with (tree / "made.jsonl").open("a") as file:
+        file.write('\n["this tr')  # a kill cut it off
+    again = measure()  # nothing is made twice
+    assert not [line for line in again if " s  old/" in line]
+    assert total in again
 
 
 def test_faults_that_change_nothing_can_still_be_drawn() -> None:

@@ -2,7 +2,8 @@
 
 python -m verification.mutants             # all listed ones; ends with 1 if more survive than told
 python -m verification.mutants gate train  # those whose names, files or lists hold one of these
-python -m verification.mutants --sample 200 --seed 1      # faults drawn over the whole package
+python -m verification.mutants --sample 200 --seed 1      # faults drawn over the whole package;
+                                           # after an interruption, the rest of them
 python -m verification.mutants --sample 50 --seed 1 spi/  # of files whose paths hold this
 """
 
@@ -17,7 +18,7 @@ from pathlib import Path
 from .copies import COPIES, Copies, run_tests, written
 from .mutation import PACKAGE, ROOT, Mutant, mutated, read_mutants
 from .reached import Reached
-from .sampling import Package, measure_sample
+from .sampling import Made, Package, measure_sample
 
 LONGEST = 240.0  # [s]; what takes longer hangs, so it is caught
 
@@ -89,8 +90,9 @@ def main(arguments: Sequence[str]) -> int:
     with copies.borrow() as copy:
         reached = Reached(copy, copy.parent, options.workers)
     package = Package(ROOT, options.words, reached)
+    record = Made(COPIES / "sample" / "made.jsonl", f"{reached.digest} {options.seconds}")
     return measure_sample(
-        options.sample, options.seed, package, copies, options.workers, options.seconds
+        options.sample, options.seed, package, copies, options.workers, options.seconds, record
     )
 
 

@@ -5,13 +5,14 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
 
-from .mutation import ROOT
+from .mutation import PACKAGE, ROOT
 
 COPIES = ROOT / "build" / "mutants"  # kept, with their compiled kernels; one for each worker
 _LEFT_OUT = shutil.ignore_patterns("__pycache__", ".*_cache", ".hypothesis")
@@ -119,3 +120,16 @@ def run_tests(
     if running.returncode in (2, 3) or "ImportError while loading conftest" in output:
         return NO_IMPORT
     raise RuntimeError(f"pytest {' '.join(tests)} ended with {running.returncode}\n{output}")
+
+
+def type_errors(copy: Path) -> Counter[str]:
+    """Return what the type checker says of the package in a copy, without the numbers of lines."""
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--no-error-summary", "--hide-error-context", PACKAGE],
+        cwd=copy, env={**os.environ, "MYPYPATH": "", "PYTHONPATH": ""}, capture_output=True,
+        text=True,
+    )  # fmt: skip
+    if done.returncode not in (0, 1):
+        raise RuntimeError(f"mypy ended with {done.returncode}\n{done.stdout}{done.stderr}")
+    lines = [line.split(":", 2) for line in done.stdout.splitlines()]
+    return Counter(f"{file}:{text}" for file, _, text in lines if "error:" in text)

@@ -1,12 +1,15 @@
-"""Faults drawn over the whole package, and the share of them that no near test catches.
+"""Faults drawn over the whole package, and the share of them that the gate does not catch.
 
-Near are the tests that run the line, where a record says which do, and those of near files.
+Near tests are asked: those that run the line, where a record says which do, and those of near
+files. Then the type checker is, whose catch is told apart.
 """
 
 from __future__ import annotations
 
 import ast
+import hashlib
 import itertools
+import json
 import os
 import time
 from collections import Counter
@@ -20,7 +23,7 @@ import numpy as np
 from scipy import stats
 
 from . import budget
-from .copies import NO_END, NO_IMPORT, Copies, run_tests, written
+from .copies import NO_END, NO_IMPORT, Copies, run_tests, type_errors, written
 from .mutation import PACKAGE, read_equal, replaced
 from .nearest import Nearest
 from .places import Place, find_places, is_kernel, required_parameters
@@ -37,6 +40,7 @@ _COMPILER = ("numba", "llvmlite")  # who imports these changes how kernels are c
 _FENCE = "fast_kernels.py"
 _DIGEST = "return digest.hexdigest()"
 _NO_DIGEST = 'return "the same for all faults"'
+_BY_TYPES = "mypy: "  # begins what the type checker says of a fault that no test catches
 
 
 class Fault(NamedTuple):
@@ -60,8 +64,38 @@ class Fault(NamedTuple):
         first, _, rest = self.file.partition("/")
         return first if rest else PACKAGE
 
+    @property
+    def key(self) -> str:
+        """A digest that no other fault has."""
+        return hashlib.sha256(f"{self.file}\n{self.source}".encode()).hexdigest()
+
     def __str__(self) -> str:
         return f"{self.file}:{self.line} {self.before} -> {self.after}   | {self.text}"
+
+
+class Made:
+    """What was made of faults before, so that a sample that was stopped goes on.
+
+    Args:
+        path: of a file that a line is added to for each fault.
+        tree: digest of the package and its tests; what was made of another tree does not count.
+    """
+
+    def __init__(self, path: Path, tree: str) -> None:
+        self._path = path
+        self._tree = tree
+        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+        rows = [json.loads(line) for line in lines if line.endswith("]")]  # the last may be cut off
+        self._tests = {fault: test for of_tree, fault, test in rows if of_tree == tree}
+
+    def test_of(self, fault: Fault) -> str | None:
+        """Return what caught a fault, empty if nothing did; None: it was not made."""
+        return self._tests.get(fault.key)
+
+    def add(self, fault: Fault, test: str) -> None:
+        """Keep what caught a fault, if anything did."""
+        with self._path.open("a", encoding="utf-8") as file:
+            file.write(f"\n{json.dumps([self._tree, fault.key, test])}")
 
 
 class Package:
@@ -145,6 +179,7 @@ def measure_sample(
     copies: Copies,
     n_workers: int,
     seconds: float,
+    record: Made,
 ) -> int:
     """Make `count` faults at places of a package; print what survives.
 
@@ -159,13 +194,18 @@ def measure_sample(
     ends: dict[tuple[str, ...], str] = {}
 
     def make(fault: Fault) -> tuple[Fault, str]:
+        made_before = record.test_of(fault)
+        if made_before is not None:
+            return fault, made_before
         began = time.monotonic()
         with copies.borrow() as copy:
             test = _caught_by(fault, copy)
             if test == NO_END and fault.tests not in ends:
                 ends[fault.tests] = _run(fault, copy)  # slow tests are no sign of a fault
-        if test == NO_END and ends[fault.tests] == NO_END:
-            test = ""
+            if test == NO_END and ends[fault.tests] == NO_END:
+                test = ""
+            test = test or _refused_by_types(fault, copy)
+        record.add(fault, test)
         print(f"{time.monotonic() - began:4.0f} s  {fault}: {test or 'SURVIVES'}", flush=True)
         return fault, test
 
@@ -193,6 +233,8 @@ def print_shares(results: Sequence[tuple[Fault, str]]) -> None:
     for room, count in sorted(counts.items()):
         print(f"{room}: {_share(n_survivors[room], count)}")
     print(f"all: {_share(len(survivors), len(results))}")
+    n_of_types = sum(test.startswith(_BY_TYPES) for _, test in results)
+    print(f"tests alone: {_share(len(survivors) + n_of_types, len(results))}")
     for fault in sorted(survivors):
         print(f"SURVIVES {fault}")
 
@@ -211,6 +253,18 @@ def _caught_by(fault: Fault, copy: Path) -> str:
     anew = fault.interpreted or fault.compiles_anew
     played = fault._replace(tests=(_TRAJECTORIES,), interpreted=False, compiles_anew=anew)
     return _caught_by_nearest(played, copy)
+
+
+def _refused_by_types(fault: Fault, copy: Path) -> str:
+    """Return what the type checker says of a fault alone; empty: nothing."""
+    file = copy / PACKAGE / fault.file
+    source = file.read_text(encoding="utf-8")
+    # A fault is written without comments, and so without what comments ignore.
+    with written(file, ast.unparse(ast.parse(source))):
+        before = type_errors(copy)
+    with written(file, fault.source):
+        errors = type_errors(copy) - before
+    return "".join(f"{_BY_TYPES}{error}" for error in sorted(errors)[:1])
 
 
 def _caught_by_nearest(fault: Fault, copy: Path) -> str:
@@ -252,7 +306,8 @@ def _print_guilty(copy: Path, results: Sequence[tuple[Fault, str]]) -> int:
 
 def _is_at_import(test: str) -> bool:
     """Return whether tests could not be read: a weak fault, which every test would catch."""
-    return test == NO_IMPORT or (test not in ("", NO_END) and "::" not in test)
+    is_by_types = test.startswith(_BY_TYPES)
+    return test == NO_IMPORT or (test not in ("", NO_END) and "::" not in test and not is_by_types)
 
 
 def shown(node: ast.expr | ast.stmt) -> str:
