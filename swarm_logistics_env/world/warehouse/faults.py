@@ -99,7 +99,7 @@ class Fault(Record):
         written: dict[str, Any] = write(self)
         for name in ("role", "kind"):
             if getattr(self, name) is None:
-                del written[name]
+                written.pop(name, None)
         return written
 
     @model_validator(mode="after")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.study.verdicts.reference import PAPER
 from swarm_logistics_env.world.warehouse import Fault
 
+FROZEN = Path(__file__).parents[2] / "frozen"
 # The specification of the statistics prints these to three decimals.
 GOLDEN = {
     "S": [1.000, 0.611, 0.276, 1.091, 0.978, 0.804, 0.208, -0.135],
@@ -216,3 +218,34 @@ def test_a_change_of_the_scenario_reaches_tables_with_a_preset_of_their_own() ->
     scenarios = [case.scenario for case in study.plan().cases]
     assert {scenario.n_items for scenario in scenarios} == {60, 70, 100}  # type: ignore[attr-defined]
     assert all(scenario.restock for scenario in scenarios)  # type: ignore[attr-defined]
+
+
+def in_words(study: Study) -> Iterator[str]:
+    """Yield what a study of its first policy compares, and the conditions of each arm."""
+    plan = study.plan()
+    yield str(plan)
+    base = dict(plan.specification.scenario)
+    first = plan.comparisons[0].policy
+    for comparison in plan.comparisons:
+        if comparison.policy == first:
+            yield (
+                f"{comparison.table}: {comparison.label}, {comparison.change}, above "
+                f"{comparison.threshold:g}, claimed {comparison.claim}"
+            )
+    for policy, table, arm in plan.cells:
+        if policy == first:
+            scenario = dict(arm.case.scenario)
+            changes = {name: x for name, x in scenario.items() if x != base[name]}
+            faults = [fault.model_dump(exclude_defaults=True) for fault in arm.case.faults]
+            yield f"{table}: {arm.setting}: {changes} {faults}"
+
+
+def test_plans_are_as_recorded(tmp_path: Path) -> None:
+    examples = sorted((Path(__file__).parents[3] / "examples").glob("*.toml"))
+    studies = {path.stem: Study.from_file(path) for path in examples}
+    studies |= {name: Study.preset(name) for name in PRESETS}
+    lines = [f"{name}: {line}" for name, study in studies.items() for line in in_words(study)]
+    made = tmp_path / "plans.txt"
+    made.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+    recorded = (FROZEN / made.name).read_text(encoding="utf-8").splitlines()
+    assert lines == recorded, f"if {made} is as it should be, put it into {FROZEN}"
