@@ -81,7 +81,7 @@ def import_named(text: str) -> Any:
     try:
         return operator.attrgetter(attribute)(code)
     except AttributeError:
-        hint = suggest(attribute, vars(code))
+        hint = suggest(attribute, [name for name in vars(code) if not name.startswith("_")])
         raise MissingNameError(f"{module} has no {attribute}{hint}") from None
 
 
