@@ -224,7 +224,7 @@ def in_words(study: Study) -> Iterator[str]:
     """Yield what a study of its first policy compares, and the conditions of each arm."""
     plan = study.plan()
     yield str(plan)
-    base = dict(plan.specification.scenario)
+    base = vars(plan.specification.scenario)
     first = plan.comparisons[0].policy
     for comparison in plan.comparisons:
         if comparison.policy == first:
@@ -234,9 +234,10 @@ def in_words(study: Study) -> Iterator[str]:
             )
     for policy, table, arm in plan.cells:
         if policy == first:
-            scenario = dict(arm.case.scenario)
-            changes = {name: x for name, x in scenario.items() if x != base[name]}
-            faults = [fault.model_dump(exclude_defaults=True) for fault in arm.case.faults]
+            scenario: Any = arm.case.scenario
+            changes = {name: x for name, x in vars(scenario).items() if x != base[name]}
+            all_faults: Any = arm.case.faults
+            faults = [fault.model_dump(exclude_defaults=True) for fault in all_faults]
             yield f"{table}: {arm.setting}: {changes} {faults}"
 
 

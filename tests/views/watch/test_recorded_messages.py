@@ -13,6 +13,7 @@ from swarm_logistics_env.views.watch.messages import Recording, frame_message, o
 
 FROZEN = Path(__file__).parents[2] / "frozen"
 SIZE: dict[str, Any] = {"n_robots": 6, "n_items": 8}
+KINDS: Any = "porter:4 max_speed=0.5, runner:2 max_speed=1.5 robot_radius=0.1"
 SESSIONS: dict[str, dict[str, Any]] = {
     "obstacles": {
         "scenario": Scenario(warehouse_width=5, warehouse_height=4, n_obstacles=2, **SIZE),
@@ -29,7 +30,7 @@ SESSIONS: dict[str, dict[str, Any]] = {
         "scenario": Scenario(
             floor="two_docks",
             request_docks="random",
-            robot_kinds="porter:4 max_speed=0.5, runner:2 max_speed=1.5 robot_radius=0.1",
+            robot_kinds=KINDS,
             **SIZE,
         ),
         "policy": "homing",
