@@ -48,6 +48,8 @@ def check_columns(
             complaints.add(IndicatorError(message))
     with complaints.noted():
         _refuse_time_limit(columns, duration)
+    with complaints.noted():
+        _refuse_time_beside_finished(columns, mapped)
     if MORE_IS_BETTER not in mapped:
         with complaints.noted():
             _refuse_time_as_performance(columns)
@@ -114,3 +116,19 @@ def _refuse_time_limit(columns: Columns, duration: float | None) -> None:
             f"{cells.name!r}, {longest:.15g}, as if they had been stopped then: --duration "
             f"{longest:.15g}{ignored} says so; where they finished, --duration with a longer time"
         )
+
+
+def _refuse_time_beside_finished(columns: Columns, mapped: Mapping[str, str]) -> None:
+    """Ask whether a time is that of a delivery or that which a trial took.
+
+    Raises:
+        IndicatorError: the trials say whether they finished, and nobody what the time is.
+    """
+    cells = columns.by_meaning.get("time")
+    if cells is None or "finished" not in columns.by_meaning or "time" in mapped:
+        return
+    raise IndicatorError(
+        f"{cells.table.source} says whether trials finished, so {cells.name!r} may be how long "
+        f"they took: --column time_to_finish={quote(cells.name)} says so; where each row is a "
+        f"delivery, --column time={quote(cells.name)}"
+    )

@@ -100,3 +100,14 @@ def test_times_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
         (tmp_path / "t.csv").write_text(HEAD + row)
         with pytest.raises(spi.IndicatorError, match=words):
             read_trials(tmp_path / "t.csv")
+
+
+def test_a_time_beside_a_column_of_finished_trials_is_asked_about(tmp_path: Path) -> None:
+    file = tmp_path / "t.csv"
+    file.write_text("robots,time,finished,trial\n4,20,yes,1\n4,60,no,2\n2,30,yes,3\n2,31,yes,4\n")
+    with pytest.raises(spi.IndicatorError, match="--column time_to_finish=time says so; where"):
+        read_trials(file)
+    took = read_trials(file, columns={"time_to_finish": "time"})
+    assert [trial.performance for trial in took.rows] == [1 / 20, 1 / 60, 1 / 30, 1 / 31]
+    deliveries = read_trials(file, columns={"time": "time"}).rows
+    assert {trial.performance for trial in deliveries} == {1.0}

@@ -28,12 +28,31 @@ TWO = "controller,robots,throughput [1/min]\n" + "".join(
     for robots in (5, 10, 20)
     for trial in range(6)
 )
+# Ever more runs collapse with the number of robots; a seed is one of them or not at each size.
+EDGE = "robots,P,seed\n" + "".join(
+    f"{robots},{1 + seed % 2 if seed < share else 2 * robots + seed % 5},{seed}\n"
+    for robots, share in ((10, 0), (20, 0), (40, 3), (60, 10), (80, 19))
+    for seed in range(20)
+)
+# Three controllers, whose order turns with the fault; one of them delivers nothing under it.
+TURNS = "controller,robots,fault,faulty,P,arena\n" + "".join(
+    f"{name},{robots},{fault},{faulty},{max(p + wall - 2, 0)},{'abcdef'[wall]}\n"
+    for name, values in (("ours", (30, 9, 2)), ("plain", (20, 18, 17)), ("none", (24, 22, 0)))
+    for (robots, fault, faulty), p in zip(((9, "none", 0), (9, "deaf", 2), (4, "none", 0)), values)
+    for wall in range(6)
+)
+TIMES = "robots,width,time,finished,trial\n" + "".join(
+    f"{robots},{width},{min(scale * (90 + 7 * trial) / robots, 60):.3g},"
+    f"{'yes' if scale * (90 + 7 * trial) / robots < 60 else 'no'},{trial}\n"
+    for robots, width, scale in ((3, 1, 1.0), (6, 1, 1.1), (6, 2, 0.7), (2, 1, 1.2))
+    for trial in range(1, 11)
+)
 GERMAN = "robots;Störung;faulty;P\n10;none;0;12,5\n10;none;0;13,5\n10;Funk;1;3,25\n"
 WIDE = "robots,run 1,run 2,run 3\n5,10,11,9\n10,22,20,n/a\n20,30,31,35\n"
 BOT = "def make():\n    return None\n\n\nclass Bad:\n    reset = None\n"
 FILES = {
     "paired.csv": PAIRED, "two.csv": TWO, "german.csv": GERMAN, "wide.csv": WIDE, "bot.py": BOT,
-    "empty.csv": "",
+    "edge.csv": EDGE, "turns.csv": TURNS, "times.csv": TIMES, "empty.csv": "",
     "words.csv": "robots,P\nfour,ten\n", "no_p.csv": "robots,speed\n1,2\n",
     "half.csv": "robots,fault,P\n5,none,9\n5,,8\n", "world.toml": "n_robots = 3\nn_items = 0\n",
     "broken.toml": "n_robots = \n",
@@ -57,7 +76,9 @@ PRINTED = (
     "judge paired.csv --check", "judge two.csv --check", "judge wide.csv --check --skip-missing",
     "judge german.csv --check --decimal , --column fault=Störung",
     "judge paired.csv", "judge two.csv --out two", "study report two --full",
-    "judge wide.csv --skip-missing --out wide",
+    "judge wide.csv --skip-missing --out wide", "study report results/judged/paired --full",
+    "judge edge.csv --out edge --full", "judge turns.csv --column seed=arena --out turns --full",
+    "judge times.csv --reference width=1 --column time_to_finish=time --full",
     "export homing --to contract --out homing.json",
     f"attack homing {SMALL} --budget 10 --fresh 10 --processes 1 --mode FM1 --mode FM4",
 )  # fmt: skip
@@ -78,7 +99,7 @@ REFUSED = (
     "judge empty.csv", "judge words.csv", "judge no_p.csv", "judge half.csv", "judge none.csv",
     "judge paired.csv --column P", "judge paired.csv --column what=P",
     "judge paired.csv --ignore nothing", "judge paired.csv --value P:1=2",
-    "judge paired.csv --reference x=1", "judge paired.csv --duration -1",
+    "judge paired.csv --reference x=1", "judge paired.csv --duration -1", "judge times.csv",
     "judge paired.csv --sum-over trial", "judge paired.csv homing", "judge paired.csv --seeds 3",
     "judge homing --check", "judge homing --seeds 0", "judge homing --minutes -1",
     "judge homing --performance speed", "judge paired.csv --decimal ;",
