@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import base64
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ from swarm_logistics_env.world.rendering.renderer import Renderer, load_pygame
 
 load_pygame()
 
+from swarm_logistics_env.views.watch.embedded import film  # noqa: E402
 from swarm_logistics_env.views.watch.film import Film, Take  # noqa: E402 - wants pygame
 
 SMALL = Scenario(n_robots=6, n_items=8, duration=12.0, warehouse_width=4, warehouse_height=4)
@@ -57,6 +60,31 @@ def test_runs_in_wide_warehouses_stand_one_above_the_other() -> None:
     height, width, _ = next(Film(takes, 1.0, 1.0, 5.0, 300).frames()).shape
     assert width == 600
     assert height > 2 * 145
+
+
+def test_runs_in_warehouses_of_unlike_shapes_stand_side_by_side() -> None:
+    flat = SMALL.replace(warehouse_width=6, warehouse_height=3)
+    takes = [Take("a", Play(scenario, policies.load("homing"), 0)) for scenario in (flat, SMALL)]
+    alone = [next(Film([a], 1.0, 1.0, 5.0, 120).frames()) for a in takes]
+    both = next(Film(takes, 1.0, 1.0, 5.0, 120).frames())
+    height, width, _ = both.shape
+    assert (height, width) == (max(map(len, alone)), sum(a.shape[1] for a in alone))
+    np.testing.assert_equal(both[: len(alone[0]), : alone[0].shape[1]], alone[0])
+
+
+def test_a_film_in_a_notebook_is_a_video_that_can_be_kept(tmp_path: Path) -> None:
+    short = film("homing", policies.load("swarm-dt"), scenario=SMALL, seed=3, until=1.0)
+    size = len(short.content) / 1e6
+    assert repr(short) == f"EmbeddedFilm('homing, SwarmDT, seed 3', {size:.1f} MB)"
+    html = short._repr_html_()
+    assert html.startswith("<video controls ")
+    assert base64.b64encode(short.content).decode() in html
+    short.save(tmp_path / "film.mp4")
+    assert (tmp_path / "film.mp4").read_bytes() == short.content
+    longer = film("homing", "swarm-dt", scenario=SMALL, seed=3, until=8.0, faults=["dead:3"])
+    assert len(longer.content) > len(short.content)
+    with pytest.raises(SetupError):
+        short.save(tmp_path / "nowhere" / "film.mp4")
 
 
 def test_wrong_arguments() -> None:

@@ -1,0 +1,40 @@
+"""What a study found, in a session and in a notebook's cell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from swarm_logistics_env.study.report.answer import answer
+from swarm_logistics_env.study.report.findings import html_table
+from swarm_logistics_env.study.report.section import Section
+from swarm_logistics_env.study.report.terminal_answer import terminal_answer
+from swarm_logistics_env.study.trial_study import judge
+
+TABLE = "policy,robots,P\n" + "".join(
+    f"<b>,{robots},{2 * robots + trial % 3}\n" for robots in (5, 10, 20) for trial in range(12)
+)
+
+
+def test_results_say_their_answer(tmp_path: Path) -> None:
+    (tmp_path / "mine.csv").write_text(TABLE)
+    results = judge(tmp_path / "mine.csv")
+    title, _, rest = repr(results).partition("\n")
+    assert title == "Results of the study 'mine'"
+    assert rest == terminal_answer(answer(results))
+    html = results._repr_html_()
+    questions = answer(results).section.rows
+    assert len(questions) == 2
+    assert html.count("<tr>") == 1 + len(questions)
+    assert "&lt;b&gt;: P" in html
+    assert "<b>" not in html
+    for sentence in (*answer(results).opening, *answer(results).summary):
+        assert f"<p>{sentence.replace('<', '&lt;').replace('>', '&gt;')}</p>" in html
+
+
+def test_a_table_keeps_its_columns_and_leaves_out_empty_lines() -> None:
+    section = Section("title", ("a & b", "c"), (("1", "<2>"),), ("below", ""))
+    head, _, body = html_table(section).partition("</thead>")
+    assert head.count("<th ") == 2
+    assert "a &amp; b" in head
+    assert "&lt;2&gt;" in body
+    assert body.endswith("<p>below</p>")
