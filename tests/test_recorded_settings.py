@@ -1,0 +1,54 @@
+"""Every preset, default and declared table, as recorded: a change of one is a change for users."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+from swarm_logistics_env import FAILURE_MODES, Scenario, policies
+from swarm_logistics_env.policies.policy import ScriptParameters
+from swarm_logistics_env.study.questions.benchmark_cells import drawn_cells
+from swarm_logistics_env.study.questions.specification import Specification
+from swarm_logistics_env.study.tasks.performance import MEASURES
+from swarm_logistics_env.train import load_training, preset_names
+from swarm_logistics_env.train.training import Training
+from swarm_logistics_env.world.rendering import palette
+from swarm_logistics_env.world.scenario import SCENARIO_PRESETS
+from swarm_logistics_env.world.scenario.order_file import ORDER_SHAPES
+
+FROZEN = Path(__file__).parent / "frozen"
+
+
+def settings() -> Iterator[tuple[str, object]]:
+    """Yield what each setting is called, and its value as JSON can have it."""
+    usual = Scenario().model_dump(mode="json")
+    for name, scenario in SCENARIO_PRESETS.items():
+        fields = scenario.model_dump(mode="json")
+        changes = {field: value for field, value in fields.items() if value != usual.get(field)}
+        yield f"preset {name}", usual if name == "paper" else changes
+    yield "training", Training().model_dump(mode="json")
+    for name in preset_names():
+        changes = load_training(name).model_dump(mode="json", exclude_defaults=True)
+        yield f"training {name}", changes
+    for name in policies.NAMES:
+        parameters = getattr(policies.load(name), "parameters", None)
+        if isinstance(parameters, ScriptParameters):
+            yield f"policy {name}", parameters.model_dump(mode="json")
+    yield "study", Specification().model_dump(mode="json")
+    for name, mode in FAILURE_MODES.items():
+        yield f"failure mode {name}", repr(mode)
+    for name, measure in MEASURES.items():
+        yield f"measure {name}", repr(measure)
+    for cell in drawn_cells("development", "any text", 12):
+        yield f"cell {cell.title}", cell.model_dump(mode="json", exclude_defaults=True)
+    yield "orders", ORDER_SHAPES
+    yield "dark colours", palette.DARK_COLOURS
+
+
+def test_settings_are_as_recorded(tmp_path: Path) -> None:
+    lines = [f"{name}: {json.dumps(value)}" for name, value in settings()]
+    made = tmp_path / "settings.txt"
+    made.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+    recorded = (FROZEN / made.name).read_text(encoding="utf-8").splitlines()
+    assert lines == recorded, f"if {made} is as it should be, put it into {FROZEN}"
