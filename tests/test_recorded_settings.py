@@ -26,7 +26,7 @@ def settings() -> Iterator[tuple[str, object]]:
     for name, scenario in SCENARIO_PRESETS.items():
         fields = scenario.model_dump(mode="json")
         changes = {field: value for field, value in fields.items() if value != usual.get(field)}
-        yield f"preset {name}", usual if name == "paper" else changes
+        yield f"preset {name}", fields if name == "paper" else changes
     yield "training", Training().model_dump(mode="json")
     for name in preset_names():
         changes = load_training(name).model_dump(mode="json", exclude_defaults=True)

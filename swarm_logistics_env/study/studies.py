@@ -179,7 +179,7 @@ class Study:
 
         Raises:
             StudyError: the store or the engine cannot be used, the store is another study's, or
-                no minute is given.
+                `minutes` is not above 0.
         """
         if minutes is not None and not minutes > 0.0:
             raise StudyError(f"minutes = {minutes:g}: should be above 0")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from gymnasium.spaces import Discrete
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Scenario, policies
@@ -95,11 +96,13 @@ def commands_for(env: Env) -> Callable[[NDArray[np.float32]], NDArray[Any]]:
         start(policy, env.unwrapped.scenario, 3)
         policy.reset(len(env.possible_agents), 3)
         return lambda rows: policy.act(rows)
-    space.seed(3)
-    return lambda rows: np.array([space.sample() for _ in rows])
+    generator = np.random.default_rng(3)
+    if isinstance(space, Discrete):
+        return lambda rows: generator.integers(space.n, size=len(rows))
+    return lambda rows: generator.uniform(-1.0, 1.0, (len(rows), *(space.shape or ())))
 
 
-def told(env: Env) -> Iterator[str]:
+def lines_of(env: Env) -> Iterator[str]:
     """Yield what two episodes pay in all and show in the mean, and what infos say at the end."""
     for seed in (1, 2):
         rows = env.reset_arrays(seed)
@@ -116,7 +119,7 @@ def told(env: Env) -> Iterator[str]:
             yield f"{name} {numbers(value)}"
 
 
-def told_of_central() -> Iterator[str]:
+def lines_of_central() -> Iterator[str]:
     env = CentralEnv(SwarmSize(_plain(), 8, leave=[(2, 10.0)]))
     rows, _ = env.reset(seed=1)
     policy = policies.load("homing")
@@ -130,26 +133,28 @@ def told_of_central() -> Iterator[str]:
     yield from (f"{name} {numbers(value)}" for name, value in sorted(info.items()))
 
 
-def told_of_rows() -> Iterator[str]:
+def lines_of_rows() -> Iterator[str]:
     """Yield what rows of worlds of two sizes are paid, over an end and a beginning."""
     for mode in ("NEXT_STEP", "SAME_STEP"):
         env = SwarmRows(3, HALL.replace(duration=20.0), n_robots=[4, 8], autoreset_mode=mode)
         rows, _ = env.reset(seed=1)
-        env.action_space.seed(2)
+        generator = np.random.default_rng(2)
         total = np.zeros(len(rows))
         for _ in range(230):
-            rows, rewards, ends, lates, infos = env.step(env.action_space.sample())
+            rows, rewards, ends, lates, infos = env.step(
+                generator.uniform(-1.0, 1.0, (len(rows), 4))
+            )
             total += rewards + 10 * ends + 100 * lates
         yield f"{mode}, paid, ends, lates {numbers(total)}, shown {numbers(np.abs(rows).mean(0))}"
         yield from (f"{name} {numbers(value)}" for name, value in sorted(infos.items()))
 
 
 def test_episodes_are_as_recorded(tmp_path: Path) -> None:
-    lines = [f"{form}: {line}" for form, make in FORMS.items() for line in told(make())]
+    lines = [f"{form}: {line}" for form, make in FORMS.items() for line in lines_of(make())]
     learning = _paid("team", RunningMeans(window=3))
-    lines += [f"running means: {line}" for _ in range(2) for line in told(learning)]
-    lines += [f"central: {line}" for line in told_of_central()]
-    lines += [f"rows: {line}" for line in told_of_rows()]
+    lines += [f"running means: {line}" for _ in range(2) for line in lines_of(learning)]
+    lines += [f"central: {line}" for line in lines_of_central()]
+    lines += [f"rows: {line}" for line in lines_of_rows()]
     made = tmp_path / "episodes.txt"
     made.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
     recorded = (FROZEN / made.name).read_text(encoding="utf-8").splitlines()

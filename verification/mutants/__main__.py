@@ -17,7 +17,7 @@ from pathlib import Path
 
 from .copies import COPIES, Copies, run_tests, written
 from .mutation import PACKAGE, ROOT, Mutant, mutated, read_mutants
-from .reached import Reached
+from .reached import Reached, digest_of
 from .sampling import Made, Package, measure_sample
 
 LONGEST = 240.0  # [s]; what takes longer hangs, so it is caught
@@ -90,7 +90,11 @@ def main(arguments: Sequence[str]) -> int:
     with copies.borrow() as copy:
         reached = Reached(copy, copy.parent, options.workers)
     package = Package(ROOT, options.words, reached)
-    record = Made(COPIES / "sample" / "made.jsonl", f"{reached.digest} {options.seconds}")
+    folders = PACKAGE, "tests", "examples", "verification"
+    paths = (path for name in folders for path in (ROOT / name).rglob("*.*"))
+    sources = [path for path in paths if path.is_file() and path.suffix != ".pyc"]
+    tree = f"{digest_of(ROOT, [*sources, ROOT / 'pyproject.toml'])} {options.seconds}"
+    record = Made(COPIES / "sample" / "made.jsonl", tree)
     return measure_sample(
         options.sample, options.seed, package, copies, options.workers, options.seconds, record
     )

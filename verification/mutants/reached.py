@@ -31,18 +31,16 @@ class Reached:
         copy: of the tree, in which a record is made if there is none of these files.
         folder: where the record is kept.
         n_workers: processes that make it.
-
-    Attributes:
-        digest: of the package and its tests.
     """
 
     def __init__(self, copy: Path, folder: Path, n_workers: int) -> None:
-        self.digest = _digest(copy)
+        paths = (path for name in (PACKAGE, "tests") for path in (copy / name).rglob("*.py"))
+        digest = digest_of(copy, paths)
         note = folder / _DIGEST
-        if not note.exists() or note.read_text(encoding="utf-8") != self.digest:
+        if not note.exists() or note.read_text(encoding="utf-8") != digest:
             note.unlink(missing_ok=True)
             _record(copy, folder, n_workers)
-            note.write_text(self.digest, encoding="utf-8")
+            note.write_text(digest, encoding="utf-8")
         self._data = CoverageData(str(folder / _DATA))
         self._data.read()
         # The copy of the record may have another name than this one.
@@ -114,9 +112,9 @@ def _seconds(path: Path) -> dict[str, float]:
     }
 
 
-def _digest(copy: Path) -> str:
-    """Return the digest of the package and its tests in a copy of the tree."""
+def digest_of(root: Path, paths: Iterable[Path]) -> str:
+    """Return the digest of files below a root, their names among it."""
     digest = hashlib.sha256()
-    for path in sorted([*(copy / PACKAGE).rglob("*.py"), *(copy / "tests").rglob("*.py")]):
-        digest.update(str(path.relative_to(copy)).encode() + b"\0" + path.read_bytes() + b"\0")
+    for path in sorted(paths):
+        digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()

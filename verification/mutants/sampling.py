@@ -1,7 +1,7 @@
 """Faults drawn over the whole package, and the share of them that the gate does not catch.
 
 Near tests are asked: those that run the line, where a record says which do, and those of near
-files. Then the type checker is, whose catch is told apart.
+files. Then the type checker runs; the share without it is printed, too.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class Made:
         self._path = path
         self._tree = tree
         lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-        rows = [json.loads(line) for line in lines if line.endswith("]")]  # the last may be cut off
+        rows = [row for line in lines if (row := _row_of(line)) is not None]
         self._tests = {fault: test for of_tree, fault, test in rows if of_tree == tree}
 
     def test_of(self, fault: Fault) -> str | None:
@@ -96,6 +96,15 @@ class Made:
         """Keep what caught a fault, if anything did."""
         with self._path.open("a", encoding="utf-8") as file:
             file.write(f"\n{json.dumps([self._tree, fault.key, test])}")
+
+
+def _row_of(line: str) -> list[str] | None:
+    """Return the row of a line; None: a kill cut it off, or it is empty."""
+    try:
+        row: list[str] = json.loads(line)
+    except ValueError:
+        return None
+    return row
 
 
 class Package:

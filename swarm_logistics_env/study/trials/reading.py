@@ -75,7 +75,7 @@ def read_trials(
         IndicatorError: the file cannot be read, or a line of it; names line, column and value.
     """
     if duration is not None and not 0.0 < duration < math.inf:
-        raise IndicatorError(f"duration = {duration:g} s: should be above 0 s")
+        raise IndicatorError(f"duration = {duration:g} s: should be a finite time above 0 s")
     mapped = dict(columns or {})
     table = long_of(read_table(source, mapped, ignore), mapped, ignore, wide)
     table = with_values(with_constants(table, mapped), mapped, values)

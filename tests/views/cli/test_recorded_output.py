@@ -83,7 +83,7 @@ PRINTED = (
     f"attack homing {SMALL} --budget 10 --fresh 10 --processes 1 --mode FM1 --mode FM4",
 )  # fmt: skip
 REFUSED = (
-    "fly", "run --policy", "run --seed two", "run --set n_robots=0",
+    "run --seed two", "run --set n_robots=0",
     "run --set max_speed=fast", "run --set speed_mix=[1,2]",
     "run --preset papr", "run --scenario world.toml", "run --scenario broken.toml",
     "run --fault FM1:0", "run --fault FM1:26", "run --fault FM1:1@-5", "run --fault FM1:1@5+0",
@@ -95,19 +95,19 @@ REFUSED = (
     "run --bodies ice", "run --set orders=1", "run --set battery=2", "run --set request_docks=all",
     "study plan odd.toml", "study plan study.toml --seeds 0", "study plan nothing.toml",
     "study run study.toml --shard 3/2", "study run study.toml --engine cloud",
-    "study compare two wide --gate x", "study report bot.py", "study merge two",
+    "study report bot.py",
     "judge empty.csv", "judge words.csv", "judge no_p.csv", "judge half.csv", "judge none.csv",
     "judge paired.csv --column P", "judge paired.csv --column what=P",
     "judge paired.csv --ignore nothing", "judge paired.csv --value P:1=2",
-    "judge paired.csv --reference x=1", "judge paired.csv --duration -1", "judge times.csv",
+    "judge paired.csv --reference x=1", "judge paired.csv --duration inf", "judge times.csv",
     "judge paired.csv --sum-over trial", "judge paired.csv homing", "judge paired.csv --seeds 3",
-    "judge homing --check", "judge homing --seeds 0", "judge homing --minutes -1",
+    "judge homing --check", "judge homing --seeds 0", "judge homing --minutes 0",
     "judge homing --performance speed", "judge paired.csv --decimal ;",
     "judge wide.csv --wide robots", "judge paired.csv --setup x",
     "attack nobody", "attack homing --mode FM9", "attack homing --robots 99",
     "export homing --to pdf",
     "export central --to c", "train papr", "train small --seed x", "watch --speed 3",
-    "watch --port 99999999", "record --episodes 0", "record --policy nobody", "list scenario x",
+    "watch --port 99999999", "record --episodes 0", "record --policy nobody",
 )  # fmt: skip
 
 
@@ -121,7 +121,9 @@ def test_output_is_as_recorded(
         code = app.run(words.split())
         printed = capsys.readouterr()
         out = re.sub(r"\d+ times real time.*", "", printed.out)
-        texts = (out, printed.err) if words in REFUSED else (out,)
+        # Typer's own words change with its version.
+        refusal = re.sub("(Invalid value for '[^']+'): .* Help", r"\1. Help", printed.err)
+        texts = (out, refusal) if words in REFUSED else (out,)
         lines += [f"$ {words}: {code}", *"".join(texts).replace(str(folder), "HERE").splitlines()]
     made = tmp_path_factory.mktemp("made") / "output.txt"
     made.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")

@@ -48,7 +48,7 @@ ORDERS: tuple[dict[str, Any], ...] = (
 )
 
 
-def told(session: Session) -> Iterator[str]:
+def lines_of(session: Session) -> Iterator[str]:
     """Yield each entry of the page's first frame, and of frames after what it may ask for."""
     recording = Recording(session)
     before: dict[str, Any] = {}
@@ -73,7 +73,7 @@ def test_messages_are_as_recorded(tmp_path: Path) -> None:
     lines = [
         f"{name}: {line}"
         for name, arguments in SESSIONS.items()
-        for line in told(Session(**arguments))
+        for line in lines_of(Session(**arguments))
     ]
     made = tmp_path / "messages.txt"
     made.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
