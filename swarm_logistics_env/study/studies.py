@@ -178,11 +178,8 @@ class Study:
                 first look; in a study that runs until it is clear.
 
         Raises:
-            StudyError: the store or the engine cannot be used, the store is another study's, or
-                `minutes` is not above 0.
+            StudyError: the store or the engine cannot be used, or the store is another study's.
         """
-        if minutes is not None and not minutes > 0.0:
-            raise StudyError(f"minutes = {minutes:g}: should be above 0")
         plan = self.plan()
         self._check_playable(shard)
         if engine is None or isinstance(engine, str):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from shlex import quote
 
@@ -99,8 +100,10 @@ def _refuse_time_limit(columns: Columns, duration: float | None) -> None:
         duration: of every trial [s], as somebody says.
 
     Raises:
-        IndicatorError: nothing says it.
+        IndicatorError: nothing says it, or `duration` is no time.
     """
+    if duration is not None and not 0.0 < duration < math.inf:
+        raise IndicatorError(f"duration = {duration:g} s: should be a finite time above 0 s")
     cells = columns.by_meaning.get("time_to_finish")
     is_said = duration is not None or {"finished", "performance"} & columns.by_meaning.keys()
     if cells is None or is_said or not cells.are_like_numbers:

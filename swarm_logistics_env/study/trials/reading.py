@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-from swarm_logistics_env.spi.inputs import IndicatorError
 
 from .cell_checks import check_cells
 from .column_checks import check_columns
@@ -74,8 +71,6 @@ def read_trials(
     Raises:
         IndicatorError: the file cannot be read, or a line of it; names line, column and value.
     """
-    if duration is not None and not 0.0 < duration < math.inf:
-        raise IndicatorError(f"duration = {duration:g} s: should be a finite time above 0 s")
     mapped = dict(columns or {})
     table = long_of(read_table(source, mapped, ignore), mapped, ignore, wide)
     table = with_values(with_constants(table, mapped), mapped, values)

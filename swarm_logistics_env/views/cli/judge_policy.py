@@ -84,7 +84,7 @@ def judge_policy_command(
         Option("--until-clear/--all-seeds", help="Stop each question where its verdict is clear."),
     ] = True,
     minutes: Annotated[
-        float | None, Option(help="Play for so long; the same command goes on.")
+        float | None, Option(min=0.0, help="Play for so long; the same command goes on.")
     ] = None,
     clearing: ClearingOption = False,
     performance: PerformanceOption = None,

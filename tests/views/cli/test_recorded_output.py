@@ -101,7 +101,7 @@ REFUSED = (
     "judge paired.csv --ignore nothing", "judge paired.csv --value P:1=2",
     "judge paired.csv --reference x=1", "judge paired.csv --duration inf", "judge times.csv",
     "judge paired.csv --sum-over trial", "judge paired.csv homing", "judge paired.csv --seeds 3",
-    "judge homing --check", "judge homing --seeds 0", "judge homing --minutes 0",
+    "judge homing --check", "judge homing --seeds 0", "judge homing --minutes -1",
     "judge homing --performance speed", "judge paired.csv --decimal ;",
     "judge wide.csv --wide robots", "judge paired.csv --setup x",
     "attack nobody", "attack homing --mode FM9", "attack homing --robots 99",
