@@ -45,7 +45,7 @@ help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
 	@echo "make paper-fit MINUTES=40  fit the constants of swarm-dt to the paper's tables, then confirm them for as long: results/paper_fit"
 	@echo "make tune MINUTES=60   search the parameters of every script by one declared rule, then confirm them: results/tune"
-	@echo "make tables          play the studies behind docs/results.md (26,000 runs, two to four hours of two cores; with the learners of make interop, if there), write its tables, the README's numbers and the scores of judge --benchmark"
+	@echo "make tables          play the studies behind docs/results.md (26,000 runs, two hours of two cores; with the learners of make interop, if there), write its tables, the README's numbers and the scores of judge --benchmark"
 	@echo "make test            the gate: lint, types, tests with coverage"
 	@echo "make interpreted     once a day: kernels by the interpreter, which checks their indices"
 	@echo "make quick           lint, types and the fastest tests, within a minute: for every commit"
