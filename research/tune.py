@@ -69,7 +69,12 @@ SCRIPTS: Mapping[str, tuple[str, ...]] = {
         "avoid_range", "clearance", "obstacle_range",
     ),
 }  # fmt: skip
-PARAMETERS: Mapping[str, tuple[str, ...]] = {**SCRIPTS, "swarm-dt-tuned": SCRIPTS["swarm-dt"]}
+PARAMETERS: Mapping[str, tuple[str, ...]] = {
+    **SCRIPTS,
+    "swarm-dt-tuned": SCRIPTS["swarm-dt"],
+    # The range would pass 1 for the rate at which a search begins, so it is left out.
+    "site-fidelity": ("give_up_rate", "turn", "turn_decay", "site_rate", "site_range"),
+}
 _BASE = Scenario.preset("realistic").replace(restock=True)
 WORLDS: Mapping[str, Scenario] = {
     "realistic": _BASE,
