@@ -187,7 +187,8 @@ def _distances(may_pass: Mask, is_goal: Mask, cell_size: float) -> Numbers:
     from scipy.sparse import csr_array  # late: an empty room needs none of scipy
     from scipy.sparse.csgraph import dijkstra
 
-    numbers = np.arange(may_pass.size).reshape(may_pass.shape)
+    # Of 32 bits, as scipy 1.14 takes no graph with others.
+    numbers = np.arange(may_pass.size, dtype=np.int32).reshape(may_pass.shape)
     starts = []
     ends = []
     lengths = []
