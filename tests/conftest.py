@@ -9,7 +9,7 @@ import os
 import pkgutil
 import sys
 import threading
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,8 @@ from swarm_logistics_env.compiler import fast_kernels
 from swarm_logistics_env.study.report import drawing
 from swarm_logistics_env.study.studies import Study
 
+# Takes the name of a file in tests/frozen, and the lines that should stand in it.
+Check = Callable[[str, Sequence[str]], None]
 # Derandomized: the gate gives the same answer twice. No deadline: a time would test the machine.
 settings.register_profile("default", max_examples=100, derandomize=True, deadline=None)
 settings.register_profile("nightly", max_examples=2000, deadline=None)
@@ -155,3 +157,17 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("played")
     assert Study(out=directory, **SMALL).run().failed == 0
     return directory
+
+
+@pytest.fixture
+def check_recorded(tmp_path_factory: pytest.TempPathFactory) -> Check:
+    """Compares lines with those that tests/frozen holds, and says where the new ones lie."""
+    frozen = Path(__file__).parent / "frozen"
+
+    def check(name: str, lines: Sequence[str]) -> None:
+        made = tmp_path_factory.mktemp("made") / name
+        made.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+        recorded = (frozen / name).read_text(encoding="utf-8").splitlines()
+        assert lines == recorded, f"if {made} is as it should be, put it into {frozen}"
+
+    return check

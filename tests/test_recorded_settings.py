@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from pathlib import Path
 
 from swarm_logistics_env import FAILURE_MODES, Scenario, policies
 from swarm_logistics_env.policies.policy import ScriptParameters
@@ -16,8 +15,7 @@ from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.world.rendering import palette
 from swarm_logistics_env.world.scenario import SCENARIO_PRESETS
 from swarm_logistics_env.world.scenario.order_file import ORDER_SHAPES
-
-FROZEN = Path(__file__).parent / "frozen"
+from tests.conftest import Check
 
 
 def settings() -> Iterator[tuple[str, object]]:
@@ -46,9 +44,6 @@ def settings() -> Iterator[tuple[str, object]]:
     yield "dark colours", palette.DARK_COLOURS
 
 
-def test_settings_are_as_recorded(tmp_path: Path) -> None:
+def test_settings_are_as_recorded(check_recorded: Check) -> None:
     lines = [f"{name}: {json.dumps(value)}" for name, value in settings()]
-    made = tmp_path / "settings.txt"
-    made.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
-    recorded = (FROZEN / made.name).read_text(encoding="utf-8").splitlines()
-    assert lines == recorded, f"if {made} is as it should be, put it into {FROZEN}"
+    check_recorded("settings.txt", lines)

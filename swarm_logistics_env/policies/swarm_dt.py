@@ -79,7 +79,7 @@ class SwarmDTParameters(ScriptParameters):
         "item_avoidance_gain": 3.91, "item_avoidance_range": 3.36, "wall_distance": 0.395,
         "taxis_gain": 2.14, "drop_rate": 0.394,
     }  # fmt: skip
-    # Part of what that search found in the paper's world: all of it cost swarms of 10 or 50.
+    # Part of what that search found in the paper's world: all of it cost a swarm of 10 a quarter.
     of_fast_robots: ClassVar[Mapping[str, float]] = {
         "diffusion": 5.15, "avoidance_gain": 0.67, "avoidance_range": 9.78,
         "item_avoidance_gain": 2.36, "item_avoidance_range": 1.2, "wall_distance": 2.26,

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,8 +27,8 @@ from swarm_logistics_env.wrappers import (
     Wrapper,
 )
 from swarm_logistics_env.wrappers.wrapper import Condition
+from tests.conftest import Check
 
-FROZEN = Path(__file__).parents[1] / "frozen"
 HALL = Scenario(
     n_robots=8, n_items=10, duration=40.0, warehouse_width=4, warehouse_height=4, restock=True
 )
@@ -59,8 +57,7 @@ def _slower() -> Env:
 
 def _paid(credit: Any, references: Any = None) -> Env:
     env = FaultInjection(_plain(), "dead", robots=2, onset=12.0)
-    whole = Condition(8)
-    references = references or {whole: 8.0, dataclasses.replace(whole, n_removed=2): 6.0}
+    references = references or {Condition(8): 8.0, Condition(8, n_removed=2): 6.0}
     weights = {"FT": 2.0, "R": 3.0, "P": 0.1}
     return IndicatorReward(env, weights, references=references, credit=credit, own_reward=0.5)
 
@@ -107,14 +104,16 @@ def lines_of(env: Env) -> Iterator[str]:
     for seed in (1, 2):
         rows = env.reset_arrays(seed)
         decide = commands_for(env)
-        shown, paid, n_steps = np.zeros(rows.shape[1]), np.zeros(len(rows)), 0
+        sizes = np.zeros(rows.shape[1])
+        payments = np.zeros(len(rows))
+        n_steps = 0
         while env.agents:
             rows, rewards, *_ = env.step_arrays(decide(rows))
-            paid = paid + rewards
-            shown += np.abs(rows).mean(axis=0)
+            payments = payments + rewards
+            sizes += np.abs(rows).mean(axis=0)
             n_steps += 1
-        yield f"{n_steps} steps, paid {numbers(paid)}"
-        yield f"shown {numbers(shown / n_steps)}"
+        yield f"{n_steps} steps, paid {numbers(payments)}"
+        yield f"shown {numbers(sizes / n_steps)}"
         for name, value in sorted(env.robot_info.items()):
             yield f"{name} {numbers(value)}"
 
@@ -124,12 +123,13 @@ def lines_of_central() -> Iterator[str]:
     rows, _ = env.reset(seed=1)
     policy = policies.load("homing")
     start(policy, HALL, 3)
-    paid, is_over = 0.0, False
+    payment = 0.0
+    is_over = False
     while not is_over:
         rows, reward, is_done, is_late, info = env.step(policy.act(rows))
-        paid += float(reward)
+        payment += float(reward)
         is_over = is_done or is_late
-    yield f"done {is_done}, late {is_late}, paid {numbers(paid)}, shown {numbers(np.abs(rows))}"
+    yield f"done {is_done}, late {is_late}, paid {numbers(payment)}, shown {numbers(np.abs(rows))}"
     yield from (f"{name} {numbers(value)}" for name, value in sorted(info.items()))
 
 
@@ -149,13 +149,10 @@ def lines_of_rows() -> Iterator[str]:
         yield from (f"{name} {numbers(value)}" for name, value in sorted(infos.items()))
 
 
-def test_episodes_are_as_recorded(tmp_path: Path) -> None:
+def test_episodes_are_as_recorded(check_recorded: Check) -> None:
     lines = [f"{form}: {line}" for form, make in FORMS.items() for line in lines_of(make())]
     learning = _paid("team", RunningMeans(window=3))
     lines += [f"running means: {line}" for _ in range(2) for line in lines_of(learning)]
     lines += [f"central: {line}" for line in lines_of_central()]
     lines += [f"rows: {line}" for line in lines_of_rows()]
-    made = tmp_path / "episodes.txt"
-    made.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
-    recorded = (FROZEN / made.name).read_text(encoding="utf-8").splitlines()
-    assert lines == recorded, f"if {made} is as it should be, put it into {FROZEN}"
+    check_recorded("episodes.txt", lines)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from itertools import groupby, product
-from pathlib import Path
 from typing import Any
 
 from gymnasium.spaces import Box, Space
@@ -12,8 +11,8 @@ from gymnasium.spaces import Box, Space
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.wrappers import DiscreteActions, MotionFrame, Wrapper
+from tests.conftest import Check
 
-FROZEN = Path(__file__).parents[1] / "frozen"
 SCENARIOS = {
     name: Scenario.preset(name) for name in ("paper", "realistic", "dotbots", "orders", "day")
 } | {
@@ -39,7 +38,7 @@ def in_words(space: Space[Any]) -> Iterator[str]:
         yield f"{len([*columns])} x [{low:.7g}, {high:.7g}]"
 
 
-def test_spaces_are_as_recorded(tmp_path: Path) -> None:
+def test_spaces_are_as_recorded(check_recorded: Check) -> None:
     lines = []
     for (name, scenario), (form, wrap) in product(SCENARIOS.items(), FORMS.items()):
         env = wrap(SwarmLogisticsEnv(scenario))
@@ -47,7 +46,4 @@ def test_spaces_are_as_recorded(tmp_path: Path) -> None:
         for kind in ("observation", "action"):
             space = getattr(env, f"{kind}_space")(agent)
             lines.append(f"{name}, {form}, {kind}: {', '.join(in_words(space))}")
-    made = tmp_path / "spaces.txt"
-    made.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
-    recorded = (FROZEN / made.name).read_text(encoding="utf-8").splitlines()
-    assert lines == recorded, f"if {made} is as it should be, put it into {FROZEN}"
+    check_recorded("spaces.txt", lines)

@@ -19,8 +19,8 @@ from swarm_logistics_env.study.tasks.task import Case, Run
 from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.study.verdicts.reference import PAPER
 from swarm_logistics_env.world.warehouse import Fault
+from tests.conftest import Check
 
-FROZEN = Path(__file__).parents[2] / "frozen"
 # The specification of the statistics prints these to three decimals.
 GOLDEN = {
     "S": [1.000, 0.611, 0.276, 1.091, 0.978, 0.804, 0.208, -0.135],
@@ -241,12 +241,9 @@ def in_words(study: Study) -> Iterator[str]:
             yield f"{table}: {arm.setting}: {changes} {faults}"
 
 
-def test_plans_are_as_recorded(tmp_path: Path) -> None:
+def test_plans_are_as_recorded(check_recorded: Check) -> None:
     examples = sorted((Path(__file__).parents[3] / "examples").glob("*.toml"))
     studies = {path.stem: Study.from_file(path) for path in examples}
     studies |= {name: Study.preset(name) for name in PRESETS}
     lines = [f"{name}: {line}" for name, study in studies.items() for line in in_words(study)]
-    made = tmp_path / "plans.txt"
-    made.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
-    recorded = (FROZEN / made.name).read_text(encoding="utf-8").splitlines()
-    assert lines == recorded, f"if {made} is as it should be, put it into {FROZEN}"
+    check_recorded("plans.txt", lines)

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from swarm_logistics_env.views.cli import app
+from tests.conftest import Check
 
-FROZEN = Path(__file__).parents[2] / "frozen"
 SMALL = (
     "--set n_robots=4 --set n_items=6 --set warehouse_width=4 --set warehouse_height=4 "
     "--set delivery_width=1 --set duration=30"
@@ -112,7 +112,7 @@ REFUSED = (
 
 
 def test_output_is_as_recorded(
-    folder: Path, tmp_path_factory: pytest.TempPathFactory, capsys: pytest.CaptureFixture[str]
+    folder: Path, check_recorded: Check, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for name, text in FILES.items():
         (folder / name).write_text(text, encoding="utf-8")
@@ -125,7 +125,4 @@ def test_output_is_as_recorded(
         refusal = re.sub("(Invalid value for '[^']+'): .* Help", r"\1. Help", printed.err)
         texts = (out, refusal) if words in REFUSED else (out,)
         lines += [f"$ {words}: {code}", *"".join(texts).replace(str(folder), "HERE").splitlines()]
-    made = tmp_path_factory.mktemp("made") / "output.txt"
-    made.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
-    recorded = (FROZEN / made.name).read_text(encoding="utf-8").splitlines()
-    assert lines == recorded, f"if {made} is as it should be, put it into {FROZEN}"
+    check_recorded("output.txt", lines)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.views.watch import Session
 from swarm_logistics_env.views.watch.messages import Recording, frame_message, obey
+from tests.conftest import Check
 
-FROZEN = Path(__file__).parents[2] / "frozen"
 SIZE: dict[str, Any] = {"n_robots": 6, "n_items": 8}
 KINDS: Any = "porter:4 max_speed=0.5, runner:2 max_speed=1.5 robot_radius=0.1"
 SESSIONS: dict[str, dict[str, Any]] = {
@@ -69,13 +68,10 @@ def lines_of(session: Session) -> Iterator[str]:
     yield f"recording: {recording.text()[:2000]}"
 
 
-def test_messages_are_as_recorded(tmp_path: Path) -> None:
+def test_messages_are_as_recorded(check_recorded: Check) -> None:
     lines = [
         f"{name}: {line}"
         for name, arguments in SESSIONS.items()
         for line in lines_of(Session(**arguments))
     ]
-    made = tmp_path / "messages.txt"
-    made.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
-    recorded = (FROZEN / made.name).read_text(encoding="utf-8").splitlines()
-    assert lines == recorded, f"if {made} is as it should be, put it into {FROZEN}"
+    check_recorded("messages.txt", lines)
