@@ -76,8 +76,11 @@ def _in_aisles(policy: str) -> GoldenTrajectory:
     return GoldenTrajectory(scenario, policy=policy, steps=300)
 
 
-def _preset(name: str, steps: int, **changed: Any) -> GoldenTrajectory:
-    return GoldenTrajectory(Scenario.preset(name).replace(**changed), steps=steps)
+def _preset(
+    name: str, steps: int, policy: str = "swarm-dt-2026", **changed: Any
+) -> GoldenTrajectory:
+    scenario = Scenario.preset(name).replace(**changed)
+    return GoldenTrajectory(scenario, steps=steps, policy=policy)
 
 
 GOLDEN = {
@@ -118,6 +121,8 @@ for _mode in FAILURE_MODES:
     _first = Fault(_mode, 2, duration=8.0 if _mode == "away" else None)
     GOLDEN[f"{_mode} from the start"] = _small(_first, **_fields)
     GOLDEN[f"{_mode} for a while"] = _small(Fault(_mode, 3, 5.0, _passing), **_fields)
+for _policy in ("homing", "homing-stock", "swarm-dt-tuned"):
+    GOLDEN[f"{_policy} in dotbots"] = _preset("dotbots", 200, policy=_policy, restock=True)
 GOLDEN |= {
     "several faults at once": _small(
         Fault("FM1", (0, 1)), Fault("motor_slow", (1, 2), 3.0, 5.0, 0.3), Fault("FM4", 2, 8.0)
@@ -171,6 +176,22 @@ GOLDEN |= {
     ),
     "central-stock": _in_aisles("central-stock"),
     "ppo-robust": _small(policy="ppo-robust", restock=True, steps=300),
+    "biased-walk": _small(policy="biased-walk", restock=True, steps=300),
+    "biased-walk-compass": _small(
+        policy="biased-walk-compass", drive="differential", n_items=16, steps=300
+    ),
+    "site-fidelity": _small(policy="site-fidelity", restock=True, n_obstacles=2, steps=300),
+    "homing-told": _small(policy="homing-told", restock=True, n_requests=2, steps=300),
+    "central that lifts slowly": _small(
+        policy="central", handling_time=0.3, n_robots=8, restock=True, steps=300
+    ),
+    "central-stock in realistic": _preset("realistic", 100, policy="central-stock", restock=True),
+    "homing-stock in realistic": _preset("realistic", 200, policy="homing-stock", restock=True),
+    "homing-stock in dots": _preset("dots", 200, policy="homing-stock", restock=True),
+    "swarm-dt-tuned": _small(policy="swarm-dt-tuned", restock=True, steps=300),
+    "ppo-delivery with wheels": _small(
+        policy="ppo-delivery", drive="differential", n_obstacles=3, restock=True, steps=300
+    ),
     "changes during the run": _small(
         delivery_width=0.5,
         events={

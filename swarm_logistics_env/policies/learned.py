@@ -31,7 +31,8 @@ from swarm_logistics_env.policies.policy import Described
 from swarm_logistics_env.policies.row_policy import UNREAD, RowPolicy
 from swarm_logistics_env.world.motion.classes import N_CLASSES
 from swarm_logistics_env.world.motion.frame import OUTPUTS, MotionView
-from swarm_logistics_env.world.motion.network_inputs import INPUTS, ROLE_INPUTS
+from swarm_logistics_env.world.motion.network_inputs import INPUTS, n_inputs
+from swarm_logistics_env.world.motion.voices import MESSAGES, N_MESSAGES
 from swarm_logistics_env.world.scenario import Scenario
 
 from .layers import Layers, in_blocks, padded, run_network
@@ -53,6 +54,9 @@ class Network(_Part):
         listens: whether it reads the lowest timer heard; if not, those inputs are zeros.
         role: whether it reads two inputs more, behind the others: a number from -1 to 1 that each
             robot draws evenly every 40 s, and on which side of 0.2 that lies.
+        talks: whether it tells its neighbours two numbers, how near the requested item and the
+            delivery area are as it estimates them (`world.motion.voices`), and reads the highest
+            that they tell. It plays where `message_size` is 2.
         hidden: widths of the hidden layers.
         activation: the activation function between layers.
         decides_every: control steps from one decision to the next; in between outputs keep their
@@ -71,6 +75,7 @@ class Network(_Part):
     outputs: tuple[str, ...] = OUTPUTS
     listens: bool = True
     role: bool = False
+    talks: bool = False
     hidden: Annotated[tuple[Width, ...], Field(max_length=8)] = (128, 128)
     activation: Literal["tanh"] = "tanh"
     decides_every: PositiveInt = 1
@@ -89,7 +94,7 @@ class Network(_Part):
     def _leave_out_later_fields(self, serialize: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
         # Cards and identities of networks without them stay as they were before these fields.
         fields = serialize(self)
-        later = {"role": False, "head": "outputs"}
+        later = {"role": False, "talks": False, "head": "outputs"}
         return {name: v for name, v in fields.items() if name not in later or v != later[name]}
 
     @property
@@ -100,9 +105,9 @@ class Network(_Part):
     @property
     def widths(self) -> list[int]:
         """The numbers of inputs, of each hidden layer's values, and of what the last layer says."""
-        n_inputs = len(self.inputs) + (len(ROLE_INPUTS) if self.role else 0)
-        n_said = N_CLASSES if self.says_classes else len(self.outputs)
-        return [n_inputs, *self.hidden, n_said]
+        n_of_outputs = N_CLASSES if self.says_classes else len(self.outputs)
+        n_said = n_of_outputs + (N_MESSAGES if self.talks else 0)
+        return [n_inputs(self.role, self.talks), *self.hidden, n_said]
 
 
 class Score(_Part):
@@ -207,6 +212,8 @@ class LearnedPolicy(RowPolicy, Described):
         )
         self._decides_every = network.decides_every
         self._listens = network.listens
+        if network.talks:
+            self.ignores = self.ignores - {"neighbour_message"}
         deviations = tensors.get("deviations", np.ones(1, np.float32))
         self._noise = deviations * np.float32(network.exploration)
         self.parameters = LearnedParameters(network=network, weights=digest(tensors))
@@ -220,21 +227,33 @@ class LearnedPolicy(RowPolicy, Described):
         return f"<b>{html.escape(repr(self))}</b><br>{html.escape(self.card.about)}"
 
     def configure(self, scenario: Scenario) -> None:
-        """Take what a robot's maker knows: its control period and its body."""
+        """Take what a robot's maker knows: its control period, its body, the size of messages."""
         network = self.card.network
-        self._frame = MotionView(scenario, network.listens, network.role)
+        self._frame = MotionView(scenario, network.listens, network.role, network.talks)
+        self._message_size = scenario.message_size
         self.reset(0, 0)
 
     def begin(self, keys: NDArray[np.uint64]) -> None:
-        """Begin an episode."""
+        """Begin an episode.
+
+        Raises:
+            PolicyError: the network talks, and messages have another size than its own.
+        """
+        network = self.card.network
+        if network.talks and len(keys) and self._message_size != N_MESSAGES:
+            raise PolicyError(
+                f"message_size = {self._message_size}: should be {N_MESSAGES} for "
+                f"{self.card.name}, whose robots tell each other as many numbers"
+            )
         self._frame.begin(keys)
-        self._outputs = np.zeros((len(keys), len(OUTPUTS)), np.float32)
+        n_outputs = len(OUTPUTS) + (N_MESSAGES if network.talks else 0)
+        self._outputs = np.zeros((len(keys), n_outputs), np.float32)
         self._n_steps = 0
         self._tell_compiled_code()
 
     def memories(self) -> dict[str, NDArray[Any]]:
         """Return all that robots remember, the network's last outputs at the end."""
-        outputs = zip(OUTPUTS, self._outputs.T, strict=True)
+        outputs = zip((*OUTPUTS, *MESSAGES), self._outputs.T)
         return self._frame.memories() | {f"output_{name}": values for name, values in outputs}
 
     def _tell_compiled_code(self) -> None:
@@ -256,13 +275,13 @@ class LearnedPolicy(RowPolicy, Described):
         self._tell_compiled_code()  # a copy has arrays of its own
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return commands (N, 4) for observation rows (N, D).
+        """Return commands (N, 4) for observation rows (N, D), with its messages if it talks.
 
         Raises:
             PolicyError: there are more or fewer rows than robots at `reset`.
         """
         self._frame.check(observations)
-        commands = np.empty((len(observations), 4))
+        commands = np.empty((len(observations), self._outputs.shape[1] + 1))
         decides = self._n_steps % self._decides_every == 0
         act_at(self._address, decides, observations, commands)
         self._n_steps += 1

@@ -28,8 +28,9 @@ from swarm_logistics_env.world.motion.classes import (
     N_GRIPS,
     N_SPEEDS,
 )
-from swarm_logistics_env.world.motion.frame import command_rows, hold_rows
+from swarm_logistics_env.world.motion.frame import N_OUTPUTS, command_rows, hold_rows
 from swarm_logistics_env.world.motion.network_inputs import read_observations
+from swarm_logistics_env.world.motion.voices import speak
 from swarm_logistics_env.world.warehouse.commands import MESSAGE
 from swarm_logistics_env.world.warehouse.stepping import step
 from swarm_logistics_env.world.warehouse.structs import World
@@ -56,6 +57,8 @@ def act_at(
     address: int, decides: bool, rows: NDArray[np.float32], commands: NDArray[np.float64]
 ) -> None:
     """Fill the commands (N, 4) of a step upon rows (N, D); the arrays at `address` go on.
+
+    Of a network that talks, commands are (N, 4 + N_MESSAGES).
 
     Args:
         decides: whether the network decides; if not, its last outputs keep their direction.
@@ -87,12 +90,14 @@ def play_at(
         n_before: steps since the reset of the policy.
     """
     world = unpacked_at(World, world_address)
-    commands = np.empty((rows.shape[0], MESSAGE))
     now = world.commands.now
-    now[:, MESSAGE:] = 0.0  # it broadcasts no messages
+    n_messages = unpacked_at(StepArrays, address).outputs.shape[1] - N_OUTPUTS
+    n_columns = MESSAGE + n_messages
+    commands = np.empty((rows.shape[0], n_columns))
+    now[:, n_columns:] = 0.0  # it broadcasts no other messages
     for number in range(positions.shape[0]):
         act_at(address, (n_before + number) % decides_every == 0, rows, commands)
-        now[:, :MESSAGE] = commands
+        now[:, :n_columns] = commands
         is_eventful = step(world_address, rows)
         positions[number] = world.robots.position
         if is_eventful:
@@ -115,20 +120,26 @@ def decide(
 ) -> None:
     """Fill the network's outputs (N, 3), with its noise, upon rows (N, D); memories go on.
 
+    Of a network that talks, outputs are (N, 3 + N_MESSAGES).
+
     Args:
         noise: the deviation of each output; of a network that says classes their temperature alone.
     """
     inputs = np.empty((rows.shape[0], layers.widths[0]), np.float32)
     read_observations(rows, period, memories, keys, counts, listens, inputs, turned)
     counts += 1
-    if layers.widths[-1] == N_CLASSES:
-        logits = np.empty((rows.shape[0], N_CLASSES), np.float32)
-        run_network(inputs, layers, logits)
-        choose_outputs(keys, counts, np.float64(noise[0]), logits, outputs)
+    said = np.empty((rows.shape[0], layers.widths[-1]), np.float32)
+    run_network(inputs, layers, said)
+    if layers.widths[-1] >= N_CLASSES:
+        choose_outputs(keys, counts, np.float64(noise[0]), said, outputs)
     else:
-        run_network(inputs, layers, outputs)
+        for robot in range(rows.shape[0]):
+            for output in range(N_OUTPUTS):
+                outputs[robot, output] = said[robot, output]
         if noise.any():
             explore(keys, counts, noise, outputs)
+    if outputs.shape[1] > N_OUTPUTS:
+        speak(said, N_OUTPUTS, outputs)
 
 
 @kernel
@@ -138,13 +149,13 @@ def explore(
     deviations: NDArray[np.float32],
     outputs: NDArray[np.float32],
 ) -> None:
-    """Add Gaussian noise, from each robot's own stream, to `outputs` (N, k).
+    """Add Gaussian noise, from each robot's own stream, to `outputs` (N, 3).
 
     Args:
         counts: the number of decisions of each robot (N,), this one among them.
     """
     for robot in range(outputs.shape[0]):
-        for output in range(outputs.shape[1]):
+        for output in range(N_OUTPUTS):
             noise = gaussian(pair_key(keys[robot], output), counts[robot] - 1)
             outputs[robot, output] += np.float32(np.float64(deviations[output]) * noise)
 
@@ -157,10 +168,11 @@ def choose_outputs(
     logits: NDArray[np.float32],
     outputs: NDArray[np.float32],
 ) -> None:
-    """Fill outputs (N, 3) of the classes that logits (N, N_CLASSES) say, see `motion.classes`.
+    """Fill outputs (N, 3) of the classes that logits say, see `motion.classes`.
 
     Args:
         counts: as `explore` has them.
+        logits: (N, N_CLASSES), or with more behind them.
         temperature: what logits are divided by before a class of each group is drawn from their
             softmax, by a number of the robot's own stream; with 0 it is the likeliest.
     """

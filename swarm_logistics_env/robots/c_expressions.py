@@ -226,7 +226,11 @@ class Expressions(Operators):
 
     def _joined(self, node: ast.BoolOp) -> Value:
         operands = [converted(self.value_of(operand), BOOL) for operand in node.values]
-        return connected("&&" if isinstance(node.op, ast.And) else "||", operands)
+        is_and = isinstance(node.op, ast.And)
+        numbers = [operand.constant for operand in operands]
+        if None not in numbers:
+            return constant(all(numbers) if is_and else any(numbers))
+        return connected("&&" if is_and else "||", operands)
 
     def _comparison(self, node: ast.Compare) -> Value:
         values = [self.value_of(operand) for operand in (node.left, *node.comparators)]

@@ -129,6 +129,8 @@ def step_of(policy: Policy, scenario: Scenario) -> Step:
 
 def _network_step(policy: LearnedPolicy, period: Known) -> Step:
     network = policy.card.network
+    if network.talks:
+        raise PolicyError("network.talks: no network that talks is written in C yet")
     arguments = (
         _ROW, period, MEMORY, _COUNT, _TURNED, KEY, Known(network.listens, "LISTENS", True),
         Known(policy._layers, "layers", True), Known(policy._noise, "noise", True),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from swarm_logistics_env.train.privileged import PRIVILEGED
 from swarm_logistics_env.train.training_worlds import check_finite
 from swarm_logistics_env.world.motion.classes import GROUPS, outputs_of
 from swarm_logistics_env.world.motion.frame import OUTPUTS
+from swarm_logistics_env.world.motion.voices import N_MESSAGES
 
 
 class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]  # not in the environment of the type check
@@ -26,25 +27,44 @@ class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]  # not in the e
 
     Args:
         n_inputs: the columns that the actor reads; the critic reads `PRIVILEGED` as well, and what
-            stands behind that is what a teacher says.
+            stands behind that is what messages and a teacher should say.
+        message_weight: weight of the messages' error, relative to PPO's loss; None: the network
+            does not talk.
 
     Attributes:
         pull: weight of the error beside the teacher, relative to PPO's loss.
-        entropy_weight: that of the entropy, where there is a pull.
+        entropy_weight: that of the entropy, where there is a pull or a message.
+        tell: takes the messages (n, N_MESSAGES) of the rows for which actions are drawn, where it
+            talks. They are what the network estimates, without noise: no action, so what others do
+            upon them teaches it nothing.
     """
 
-    def __init__(self, *arguments: Any, n_inputs: int, **named: Any) -> None:
+    def __init__(
+        self, *arguments: Any, n_inputs: int, message_weight: float | None = None, **named: Any
+    ) -> None:
         self.n_inputs = n_inputs
+        self.message_weight = message_weight
         self.pull = 0.0
         self.entropy_weight = 0.0
+        self.tell: Callable[[NDArray[np.float32]], None] = lambda messages: None
         super().__init__(*arguments, **named)
+
+    @property
+    def talks(self) -> bool:
+        """Whether the network says messages."""
+        return self.message_weight is not None
 
     def _build_mlp_extractor(self) -> None:
         self.mlp_extractor = _TwoReaders(self.n_inputs, self.net_arch)
+        if self.talks:
+            self.message_net = torch.nn.Linear(self.mlp_extractor.latent_dim_pi, N_MESSAGES)
 
     def forward(self, columns: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Return actions drawn for each row, values and the actions' log probabilities."""
-        answers, values = self._answers_and_values(columns)
+        hidden, values = self._hidden_and_values(columns)
+        answers = self._answers(hidden)
+        if self.talks:
+            self.tell(self._messages(hidden))
         actions, log_probability = self._draw(answers)
         return actions, values, log_probability
 
@@ -52,22 +72,45 @@ class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]  # not in the e
         self, columns: torch.Tensor, actions: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Return values, and log probabilities and entropies of actions, of each row."""
-        answers, values = self._answers_and_values(columns)
+        hidden, values = self._hidden_and_values(columns)
+        answers = self._answers(hidden)
         log_probability, entropy = self._judge(answers, actions)
+        # PPO takes the mean of this from its loss, as `ent_coef` is 1 then, see `pull_by`.
+        if self.pull > 0.0 or self.talks:
+            entropy = self.entropy_weight * entropy
         if self.pull > 0.0:
-            # PPO takes the mean of this from its loss, as `ent_coef` is 1 then, see `pull_by`.
             error = self.error(answers, columns[:, -len(OUTPUTS) :])
-            entropy = self.entropy_weight * entropy - self.pull * error
+            entropy = entropy - self.pull * error
+        if self.message_weight is not None:
+            first = self.mlp_extractor.n_columns
+            messages = columns[:, first : first + N_MESSAGES]
+            error = self._message_error(hidden, messages)
+            entropy = entropy - self.message_weight * error
         return values, log_probability, entropy
 
     def answers_of(self, inputs: torch.Tensor) -> Any:
         """Return what the actor's last layer says upon rows of its inputs."""
         return self.action_net(self.mlp_extractor.policy_net(inputs))
 
+    def messages_of(self, inputs: torch.Tensor) -> NDArray[np.float32]:
+        """Return the messages (n, N_MESSAGES) that it tells upon rows of its inputs."""
+        return self._messages(self.mlp_extractor.policy_net(inputs))
+
+    def imitation_loss(self, inputs: torch.Tensor, labels: torch.Tensor) -> torch.Tensor:
+        """Return the mean error beside labels (n, 3), or with messages behind them."""
+        hidden = self.mlp_extractor.policy_net(inputs)
+        loss = self.error(self.action_net(hidden), labels[:, : len(OUTPUTS)]).mean()
+        if self.message_weight is not None:
+            error = self._message_error(hidden, labels[:, len(OUTPUTS) :])
+            loss = loss + self.message_weight * error.mean()
+        return loss
+
     def actor_parameters(self) -> Iterator[Any]:
         """Yield what the actor learns."""
         yield from self.mlp_extractor.policy_net.parameters()
         yield from self.action_net.parameters()
+        if self.talks:
+            yield from self.message_net.parameters()
 
     def error(self, answers: torch.Tensor, labels: torch.Tensor) -> torch.Tensor:
         """Return how far the last layer's answers are from `NetworkView.labels`, (n,)."""
@@ -85,11 +128,21 @@ class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]  # not in the e
     ) -> tuple[torch.Tensor, torch.Tensor]:
         raise NotImplementedError
 
-    def _answers_and_values(self, columns: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    def _hidden_and_values(self, columns: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         for_outputs, for_values = self.mlp_extractor(columns)
-        answers = self.action_net(for_outputs)
+        return for_outputs, self.value_net(for_values)
+
+    def _answers(self, hidden: torch.Tensor) -> Any:
+        answers = self.action_net(hidden)
         check_finite("an output of the network", answers.detach().cpu().numpy())
-        return answers, self.value_net(for_values)
+        return answers
+
+    def _message_error(self, hidden: torch.Tensor, messages: torch.Tensor) -> torch.Tensor:
+        return ((self.message_net(hidden) - messages) ** 2).mean(dim=1)
+
+    def _messages(self, hidden: torch.Tensor) -> NDArray[np.float32]:
+        messages: NDArray[np.float32] = self.message_net(hidden).detach().clamp(0, 1).cpu().numpy()
+        return messages
 
 
 class GaussianPolicy(AsymmetricPolicy):

@@ -18,6 +18,7 @@ from swarm_logistics_env.train.settings import Teaching
 from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.train.training_worlds import check_finite
 from swarm_logistics_env.world.motion.frame import OUTPUTS
+from swarm_logistics_env.world.motion.voices import N_MESSAGES
 
 ROUNDS = 12  # of collecting rows and learning from all rows so far
 BATCH = 1024
@@ -53,7 +54,8 @@ def _imitate(
     n_steps = max(1, round(settings.decisions / (ROUNDS * training.rows)))
     n_new = n_steps * training.rows
     rows = np.empty((ROUNDS * n_new, training.network.widths[0]), np.float32)
-    labels = np.empty((len(rows), len(OUTPUTS)), np.float32)
+    n_messages = N_MESSAGES if policy.talks else 0
+    labels = np.empty((len(rows), len(OUTPUTS) + n_messages), np.float32)
     optimizer = torch.optim.Adam(policy.actor_parameters(), settings.rate)
     first, last = settings.shares
     columns = learner.env.reset()
@@ -68,9 +70,10 @@ def _imitate(
                 group["lr"] = rate
             for _ in range(max(1, settings.epochs * n_new // BATCH)):
                 batch = rng.integers(new.stop, size=BATCH)
-                answers = policy.answers_of(torch.from_numpy(rows[batch]).to(learner.device))
                 wanted = torch.from_numpy(labels[batch]).to(learner.device)
-                loss = policy.error(answers, wanted).mean()
+                loss = policy.imitation_loss(
+                    torch.from_numpy(rows[batch]).to(learner.device), wanted
+                )
                 optimizer.zero_grad()
                 loss.backward()
                 optimizer.step()
@@ -94,19 +97,21 @@ def _collect(
         share: of the robots that do what the teacher says, drawn anew at every decision.
     """
     view = learner.env
+    policy = learner.policy
     n_rows = len(columns)
     for first in range(0, len(rows), n_rows):
         new = slice(first, first + n_rows)
         rows[new] = columns[:, : rows.shape[1]]
-        labels[new] = view.labels
+        labels[new] = np.hstack([view.labels, view.true_messages])
         outputs = view.advice.copy()
         is_own = rng.random(n_rows) >= share
-        if is_own.any():
-            with torch.no_grad():
-                answers = learner.policy.answers_of(
-                    torch.from_numpy(rows[new][is_own]).to(learner.device)
-                )
-            outputs[is_own] = learner.policy.likeliest_outputs(answers)
+        inputs = torch.from_numpy(rows[new]).to(learner.device)
+        with torch.no_grad():
+            if is_own.any():
+                answers = policy.answers_of(inputs[is_own])
+                outputs[is_own] = policy.likeliest_outputs(answers)
+            if policy.talks:
+                view.take_messages(policy.messages_of(inputs))
         outputs += noise * NOISE_SHARES * rng.standard_normal(outputs.shape)
         view.give_outputs(outputs)
         columns, *_ = view.step_wait()

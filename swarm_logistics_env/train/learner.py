@@ -41,6 +41,8 @@ def make_learner(
     of_policy: dict[str, Any] = {"net_arch": net_arch, "n_inputs": network.widths[0]}
     if network.says_classes:
         of_policy["temperature"] = network.exploration or 1.0
+    if network.talks:
+        of_policy["message_weight"] = ppo.message_weight
     learner = PPO(
         ClassesPolicy if network.says_classes else GaussianPolicy,
         view,
@@ -67,6 +69,8 @@ def make_learner(
         else:
             policy.log_std.copy_(torch.tensor(ppo.deviations).log())
             policy.action_net.bias.copy_(torch.tensor(FIRST_OUTPUTS))
+    policy.tell = view.take_messages
+    pull_by(learner, 0.0, ppo)
     return learner
 
 
@@ -75,7 +79,7 @@ def pull_by(learner: PPO, pull: float, ppo: PPOSettings) -> None:
     policy = learner.policy
     policy.pull = pull
     policy.entropy_weight = ppo.entropy
-    learner.ent_coef = 1.0 if pull > 0.0 else ppo.entropy
+    learner.ent_coef = 1.0 if pull > 0.0 or policy.talks else ppo.entropy
 
 
 def check_learner(learner: Any) -> None:
@@ -108,9 +112,10 @@ def tensors_of(policy: Any) -> dict[str, NDArray[np.float32]]:
     if isinstance(policy, GaussianPolicy):
         tensors["deviations"] = _array(policy.log_std.exp())
     hidden = [m for m in policy.mlp_extractor.policy_net if isinstance(m, torch.nn.Linear)]
-    for layer, linear in enumerate([*hidden, policy.action_net]):
-        tensors[f"layers.{layer}.weight"] = _array(linear.weight)
-        tensors[f"layers.{layer}.bias"] = _array(linear.bias)
+    last = [policy.action_net, policy.message_net] if policy.talks else [policy.action_net]
+    for layer, parts in enumerate([*([linear] for linear in hidden), last]):
+        tensors[f"layers.{layer}.weight"] = _array(torch.cat([part.weight for part in parts]))
+        tensors[f"layers.{layer}.bias"] = _array(torch.cat([part.bias for part in parts]))
     return tensors
 
 
@@ -188,6 +193,7 @@ def restore(learner: PPO, state: dict[str, Any]) -> None:
     """Bring a new learner to where that of the checkpoint stood, and its worlds as well."""
     learner.env.close()
     learner.set_env(state["view"], force_reset=False)
+    learner.policy.tell = state["view"].take_messages
     learner.policy.load_state_dict(state["policy"])
     learner.policy.optimizer.load_state_dict(state["optimizer"])
     for name in STATE:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env.compiler.addresses import unpacked_at
 from swarm_logistics_env.compiler.kernels import engine_kernel, kernel
 from swarm_logistics_env.world.motion.memory import length_of, to_frame
+from swarm_logistics_env.world.motion.voices import SILENT
 from swarm_logistics_env.world.warehouse.structs import NOBODY, World
 
 
@@ -43,6 +44,21 @@ class PrivilegedColumns(NamedTuple):
 
 
 PRIVILEGED = PrivilegedColumns(*range(len(PrivilegedColumns._fields)))
+_UNIT = 10.0  # [m] of these lengths
+
+
+def messages_of(privileged: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return what networks that talk should say (rows, 2), see `world.motion.voices`.
+
+    Args:
+        privileged: (rows, len(PRIVILEGED)).
+    """
+    along, aside = privileged[:, [PRIVILEGED.requested_along, PRIVILEGED.requested_aside]].T
+    is_to_be_had = ((along != 0.0) | (aside != 0.0)) & (privileged[:, PRIVILEGED.is_carried] == 0.0)
+    to_item = np.where(is_to_be_had, _UNIT * privileged[:, PRIVILEGED.requested_distance], SILENT)
+    to_dock = -_UNIT * privileged[:, PRIVILEGED.to_delivery]
+    nearness = 1.0 - np.stack([to_item, to_dock], axis=1) / SILENT
+    return np.clip(nearness, 0.0, 1.0).astype(np.float32)
 
 
 @engine_kernel

@@ -156,6 +156,8 @@ class PPOSettings(Part):
         least_deviation: the lower limit of deviations at the start and at the end; it changes
             geometrically in between. Without it the noise vanishes long before the policy is good.
         least_until: the share of the training after which the limit stays at its end.
+        message_weight: the weight of the messages' squared error relative to the policy's loss,
+            where a network talks: what it says is learned from what is so, known while it trains.
         value_hidden: widths of the value network, which is not shipped. It reads more than a robot
             can sense, see `privileged.PRIVILEGED`.
     """
@@ -176,6 +178,7 @@ class PPOSettings(Part):
     deviations: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = (0.5, 0.5, 0.5)
     least_deviation: tuple[PositiveFloat, PositiveFloat] = (0.001, 0.001)
     least_until: Fraction = 1.0
+    message_weight: NonNegativeFloat = 1.0
     value_hidden: tuple[PositiveInt, ...] = (128, 128)
 
     @field_validator("restarts")

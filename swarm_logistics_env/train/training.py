@@ -23,6 +23,7 @@ from swarm_logistics_env.train.settings import (
     Teaching,
     WorldKind,
 )
+from swarm_logistics_env.world.motion.voices import N_MESSAGES
 from swarm_logistics_env.world.scenario import Scenario
 
 PRESETS_FOLDER = Path(__file__).parent / "presets"
@@ -96,8 +97,11 @@ class Training(Part):
 
     @model_validator(mode="after")
     def _check_consistency(self) -> Self:
-        if any(scenario.message_size for _, scenario in self.each_world):
-            raise ValueError("scenario.message_size: should be 0, the network sends no messages")
+        size = N_MESSAGES if self.network.talks else 0
+        scenarios = [self.scenario, *(scenario for _, scenario in self.each_world)]
+        if any(scenario.message_size != size for scenario in scenarios):
+            reason = f"network.talks = {str(self.network.talks).lower()}"
+            raise ValueError(f"scenario.message_size: should be {size}, as {reason}")
         self._check_decisions()
         self._check_indicators()
         if self.network.says_classes:

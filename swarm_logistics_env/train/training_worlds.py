@@ -17,13 +17,14 @@ from swarm_logistics_env.core.streams import generator, key, row_keys
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import faults_among, scenario_fields
 from swarm_logistics_env.policies.learned import STREAM
-from swarm_logistics_env.train.privileged import PRIVILEGED, fill_privileged
+from swarm_logistics_env.train.privileged import PRIVILEGED, fill_privileged, messages_of
 from swarm_logistics_env.train.settings import Conditions
 from swarm_logistics_env.train.teacher import Teacher
 from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.world.motion.classes import GROUPS, classes_of, outputs_of
 from swarm_logistics_env.world.motion.frame import OUTPUTS, MotionView
 from swarm_logistics_env.world.motion.memory import bodies_of
+from swarm_logistics_env.world.motion.voices import N_MESSAGES
 from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse import Fault
 from swarm_logistics_env.wrappers import IndicatorReward, RunningMeans, SwarmSize, Wrapper
@@ -103,8 +104,8 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     """Turns observation rows into a network's inputs, and its outputs into commands.
 
     By the code that plays the policy afterwards, so that both see the same. What the value network
-    alone reads, `PRIVILEGED`, stands behind these inputs; where a teacher pulls, its `labels` do
-    behind that.
+    alone reads, `PRIVILEGED`, stands behind these inputs; where a network talks, what it should say
+    (`messages_of`) does behind that, and where a teacher pulls, its `labels` come last.
 
     Args:
         training: whose worlds these are; every robot is a row.
@@ -122,17 +123,19 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     def __init__(self, training: Training) -> None:
         worlds = make_worlds(training)
         network = training.network
-        self.frame = MotionView(training.scenario, network.listens, network.role)
+        self.frame = MotionView(training.scenario, network.listens, network.role, network.talks)
         self._says_classes = network.says_classes
+        self._n_messages = N_MESSAGES if network.talks else 0
         teaching = training.teacher
         self.teacher = None if teaching is None else Teacher(teaching, worlds)
         self.advice = np.zeros((worlds.num_envs, len(OUTPUTS)))
         self._has_labels = teaching is not None and teaching.pull > 0.0
         self._privileged = np.zeros((worlds.num_envs, len(PRIVILEGED)), np.float32)
+        self._messages = np.zeros((worlds.num_envs, self._n_messages), np.float32)
         self._n_episodes = 0
         self._seed = 0
         self._n_held = network.decides_every - 1
-        n_columns = network.widths[0] + len(PRIVILEGED)
+        n_columns = network.widths[0] + len(PRIVILEGED) + self._n_messages
         n_columns += len(OUTPUTS) if self._has_labels else 0
         actions = Box(-1.0, 1.0, (len(OUTPUTS),), np.float32)
         super().__init__(
@@ -171,8 +174,12 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
     def give_outputs(self, outputs: NDArray[np.floating]) -> None:
         """Take the outputs (num_envs, 3) of the step that `step_wait` makes."""
-        self._outputs = outputs
+        self._outputs = np.hstack([outputs, self._messages])
         self._command()
+
+    def take_messages(self, messages: NDArray[np.float32]) -> None:
+        """Take the messages (num_envs, N_MESSAGES) of the next step, before its outputs."""
+        self._messages = messages
 
     def _command(self) -> None:
         self.venv.step_async(self.frame.command(self._outputs))
@@ -229,10 +236,15 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
     def _columns_behind(self, rows: slice | NDArray[np.int64]) -> list[NDArray[np.float32]]:
         """Return what stands behind the inputs of these rows."""
-        columns = [self._privileged[rows]]
+        columns = [self._privileged[rows], self.true_messages[rows]]
         if self._has_labels:
             columns.append(self.labels[rows])
         return columns
+
+    @property
+    def true_messages(self) -> NDArray[np.float32]:
+        """What the network should tell (num_envs, N_MESSAGES); (num_envs, 0): it does not talk."""
+        return messages_of(self._privileged)[:, : self._n_messages]
 
     @property
     def labels(self) -> NDArray[np.float32]:

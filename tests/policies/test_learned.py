@@ -10,14 +10,16 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, run_episode
+from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.policies import PolicyCard, identity
 from swarm_logistics_env.policies.layers import hyperbolic_tangent
-from swarm_logistics_env.policies.learned import LearnedPolicy
+from swarm_logistics_env.policies.learned import LearnedPolicy, tensor_shapes
 from swarm_logistics_env.policies.network_steps import explore
 from swarm_logistics_env.policies.policy import start
 from swarm_logistics_env.world.motion import INPUTS
 from swarm_logistics_env.world.observations import N_COLUMNS, TURN_RATE
+from swarm_logistics_env.world.warehouse import Warehouse
 
 Tensors = dict[str, NDArray[np.float32]]
 
@@ -164,3 +166,55 @@ def test_it_steers_the_body_that_the_robots_of_a_scenario_have(
 
     assert turns(Scenario(n_robots=4, drive="differential"))
     assert not turns(Scenario(n_robots=4, drive="holonomic"))
+
+
+@pytest.fixture
+def talking(card: PolicyCard) -> LearnedPolicy:
+    """A network of drawn numbers that talks."""
+    network = card.network.replace(talks=True, role=True, exploration=0.0)
+    rng = np.random.default_rng(1)
+    tensors = {
+        name: rng.normal(0.0, 0.3, shape).astype(np.float32)
+        for name, shape in tensor_shapes(network).items()
+    }
+    return LearnedPolicy(card.replace(network=network), tensors)
+
+
+def test_a_network_that_talks_tells_its_neighbours_two_numbers_and_hears_them(
+    talking: LearnedPolicy,
+) -> None:
+    scenario = Scenario(n_robots=6, n_items=8, duration=20.0, message_size=2)
+
+    class Own(LearnedPolicy):
+        """Asked for each command."""
+
+    class Deaf(Own):
+        def act(self, rows: NDArray[np.float32]) -> NDArray[np.float64]:
+            deaf = rows.copy()
+            deaf[:, N_COLUMNS:] = 0.0
+            return super().act(deaf)
+
+    def played(kind: type[LearnedPolicy]) -> str:
+        return run_episode(scenario, kind(talking.card, talking.tensors), seed=2).digest
+
+    assert played(LearnedPolicy) == played(Own) != played(Deaf)
+    warehouse = Warehouse(scenario)
+    rows = warehouse.reset(0)
+    start(talking, scenario, 0)
+    commands = talking.act(rows)
+    assert commands.shape == (6, 6)
+    assert ((commands[:, 4:] >= 0.0) & (commands[:, 4:] <= 1.0)).all()
+    warehouse.step(commands)
+    np.testing.assert_allclose(warehouse.state.robot_message, commands[:, 4:])
+    assert talking.memories()["output_dock_nearness"].tolist() == commands[:, 5].tolist()
+
+
+def test_a_network_that_talks_plays_where_messages_have_its_size_and_cards_say_so(
+    talking: LearnedPolicy,
+) -> None:
+    with pytest.raises(PolicyError, match="message_size = 0: should be 2 for"):
+        run_episode(Scenario(n_robots=2, duration=1.0), talking, seed=0)
+    assert "neighbour_message" not in talking.ignores
+    assert "neighbour_message" in LearnedPolicy.ignores
+    assert talking.card.network.model_dump()["talks"] is True
+    assert "talks" not in talking.card.network.replace(talks=False).model_dump()

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("torch")
@@ -9,12 +10,14 @@ pytest.importorskip("stable_baselines3")
 
 import torch
 
+from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.train.learner import make_learner
 from swarm_logistics_env.train.privileged import PRIVILEGED
 from swarm_logistics_env.train.settings import PPOSettings
 from swarm_logistics_env.train.training_worlds import NetworkView
 from swarm_logistics_env.world.motion.frame import OUTPUTS
 from swarm_logistics_env.world.motion.network_inputs import INPUTS
+from swarm_logistics_env.world.motion.voices import N_MESSAGES
 
 
 def test_the_actor_sees_nothing_of_it(small: Any) -> None:
@@ -59,3 +62,32 @@ def test_where_a_teacher_pulls_ppo_is_paid_for_entropy_less_the_error_beside_it(
         policy.pull, policy.entropy_weight = 0.2, 0.5
         pulled = policy.evaluate_actions(columns, actions)[2]
     torch.testing.assert_close(pulled, 0.5 * entropy - 0.2 * error)
+
+
+@pytest.mark.parametrize("head", ["outputs", "classes"])
+def test_what_a_network_tells_is_learned_from_what_is_so_and_is_told_without_noise(
+    small: Any, head: str
+) -> None:
+    network = Network(hidden=(8,), talks=True, head=head)
+    scenario = small().scenario.replace(message_size=N_MESSAGES)
+    ppo = small().ppo.replace(message_weight=0.3, entropy=0.5)
+    training = small(network=network, scenario=scenario, ppo=ppo)
+    view = NetworkView(training)
+    learner = make_learner(view, network, training.ppo, 0, "cpu")
+    policy = learner.policy
+    columns = torch.from_numpy(view.reset())
+    inputs = columns[:, : network.widths[0]]
+    with torch.no_grad():
+        actions, _, log_probability = policy(columns)
+        estimates = policy.message_net(policy.mlp_extractor.policy_net(inputs))
+        view.step(actions.numpy())
+        judged = policy.evaluate_actions(columns, actions)
+        policy.message_weight = 0.0
+        bare = policy.evaluate_actions(columns, actions)
+    sent = [world.warehouse.state.robot_message for world in view.venv.worlds]
+    np.testing.assert_allclose(np.concatenate(sent), estimates.clamp(0.0, 1.0), atol=1e-6)
+    torch.testing.assert_close(judged[1], log_probability)
+    assert learner.ent_coef == 1.0
+    truth = columns[:, network.widths[0] + len(PRIVILEGED) :]
+    error = ((estimates - truth) ** 2).mean(dim=1)
+    torch.testing.assert_close(judged[2], bare[2] - 0.3 * error)

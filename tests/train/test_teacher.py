@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from safetensors.numpy import load_file
 
 pytest.importorskip("torch")
@@ -25,6 +26,8 @@ from swarm_logistics_env.train.learner import make_learner, tensors_of
 from swarm_logistics_env.train.trainer import train
 from swarm_logistics_env.train.training_callback import TrainingLog
 from swarm_logistics_env.train.training_worlds import NetworkView
+from swarm_logistics_env.world.motion.frame import OUTPUTS
+from swarm_logistics_env.world.motion.voices import N_MESSAGES
 
 CLASSES = Network(hidden=(8,), head="classes", role=True, exploration=0.5)
 
@@ -55,13 +58,19 @@ def test_robots_that_do_what_it_says_go_where_it_goes_itself(small: Any, drive: 
     np.testing.assert_allclose(states[0].robot_position, states[1].robot_position, atol=1e-6)
 
 
+TALKING = CLASSES.replace(talks=True)
+
+
 @pytest.mark.daily
 def test_a_training_with_a_teacher_goes_on_to_the_same_bits_and_keeps_the_best_network(
     small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     teacher = {"policy": "homing", "decisions": 200, "warm_up": 1, "pull": 0.1, "pull_until": 0.6}
     rewards = {"delivery": 1.0, "held_inside": 0.3, "contact": -0.1}
-    training = small(network=CLASSES, teacher=teacher, rewards=rewards, keep="best")
+    scenario = small().scenario.replace(message_size=N_MESSAGES)
+    training = small(
+        network=TALKING, scenario=scenario, teacher=teacher, rewards=rewards, keep="best"
+    )
 
     def interrupt(inside: dict[str, Any], _: object) -> bool:
         if inside["self"].num_timesteps > 330:
@@ -78,22 +87,34 @@ def test_a_training_with_a_teacher_goes_on_to_the_same_bits_and_keeps_the_best_n
     assert last == weights(train(training.replace(keep="last"), tmp_path / "uncut"))
 
 
-@pytest.mark.parametrize("network", [CLASSES, Network(hidden=(8,))])
+@pytest.mark.parametrize("network", [TALKING, Network(hidden=(8,))])
 def test_the_network_comes_to_say_what_the_teacher_says_and_the_critic_warms_up_alone(
     small: Any, tmp_path: Path, network: Network
 ) -> None:
     teacher = {"policy": "homing", "decisions": 4000, "warm_up": 2, "rate": 0.03}
-    training = small(network=network, teacher=teacher)
+    scenario = small().scenario.replace(message_size=N_MESSAGES if network.talks else 0)
+    training = small(network=network, scenario=scenario, teacher=teacher)
     other = NetworkView(training)
     other.seed(1)
     columns = torch.from_numpy(other.reset())[:, : network.widths[0]]
-    labels = torch.from_numpy(other.labels)
+    labels = torch.from_numpy(np.hstack([other.labels, other.true_messages]))
     learner = make_learner(NetworkView(training), network, training.ppo, training.seed, "cpu")
     policy = learner.policy
-    before = policy.error(policy.answers_of(columns), labels).mean().item()
+    n_outputs = len(OUTPUTS)
+
+    def errors() -> NDArray[np.float64]:
+        """Return the error of outputs, and that of messages, if any."""
+        of_outputs = policy.error(policy.answers_of(columns), labels[:, :n_outputs]).mean().item()
+        if not network.talks:
+            return np.array([of_outputs])
+        messages = torch.from_numpy(policy.messages_of(columns))
+        of_messages = ((messages - labels[:, n_outputs:]) ** 2).mean().item()
+        return np.array([of_outputs, of_messages])
+
+    before = errors()
     with one_thread():
         imitate(training, learner, TrainingLog(), generator(training.seed, "imitation"))
-    assert policy.error(policy.answers_of(columns), labels).mean().item() < 0.8 * before
+    assert (errors() < 0.8 * before).all()
     imitated = {name: tensor.tobytes() for name, tensor in tensors_of(learner.policy).items()}
     shorter = training.replace(agent_steps=320)
     assert weights(train(shorter, tmp_path / "warm")) == imitated

@@ -25,9 +25,10 @@ from swarm_logistics_env.world.motion.memory import (
 from swarm_logistics_env.world.motion.steering import clear_the_way, steer
 from swarm_logistics_env.world.scenario import Scenario
 
-from .network_inputs import COSINES, INPUTS, ROLE_INPUTS, SINES, TURNS, read_observations
+from .network_inputs import COSINES, SINES, TURNS, n_inputs, read_observations
 
 OUTPUTS = ("along", "aside", "gripper")
+N_OUTPUTS = len(OUTPUTS)
 
 
 class MotionView:
@@ -39,6 +40,8 @@ class MotionView:
         scenario: for its control period and for what robots know of their bodies.
         listens: whether the lowest timer heard is read; zeros if not, so that no liar leads.
         has_role: whether `ROLE_INPUTS` stand behind the other inputs.
+        talks: whether rows end with messages, `VOICE_INPUTS` stand behind the other inputs, and
+            `MESSAGES` behind the outputs.
 
     Attributes:
         keys: of each row's stream (N,).
@@ -48,11 +51,17 @@ class MotionView:
         turned: how far each row's frame is turned from its robot's body (N,) [rad].
     """
 
-    def __init__(self, scenario: Scenario, listens: bool = True, has_role: bool = False) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        listens: bool = True,
+        has_role: bool = False,
+        talks: bool = False,
+    ) -> None:
         self.period = scenario.control_period
         self._bodies = bodies_of(scenario)
         self._listens = listens
-        self._n_inputs = len(INPUTS) + (len(ROLE_INPUTS) if has_role else 0)
+        self._n_inputs = n_inputs(has_role, talks)
         self.begin(np.empty(0, np.uint64))
 
     def begin(self, keys: NDArray[np.uint64], bodies: NDArray[np.float64] | None = None) -> None:
@@ -144,9 +153,10 @@ class MotionView:
         """Return the commands (N, 4) that outputs (N, 3) ask for upon the rows last read.
 
         A robot that is caged by items clears its way instead.
-        A differential robot turns its body to where it wants to drive.
+        A differential robot turns its body to where it wants to drive. Messages behind the outputs
+        stand behind the commands.
         """
-        commands = np.empty((len(outputs), 4))
+        commands = np.empty((len(outputs), outputs.shape[1] + 1))
         command_rows(outputs, self.turned, self.rows, self.memory, commands)
         return commands
 
@@ -174,11 +184,18 @@ def command_rows(
     memories: NDArray[np.float64],
     commands: NDArray[np.float64],
 ) -> None:
-    """Fill the commands (N, 4) of outputs (N, 3) upon rows; memories take note of them."""
+    """Fill the commands (N, 4) of outputs (N, 3) upon rows; memories take note of them.
+
+    Messages behind the outputs stand behind the commands.
+    """
     for robot in range(outputs.shape[0]):
-        along, aside, gripper = outputs[robot]
-        turn_outputs(float(along), float(aside), float(gripper), turned[robot], commands[robot])
+        along = float(outputs[robot, 0])
+        aside = float(outputs[robot, 1])
+        gripper = float(outputs[robot, 2])
+        turn_outputs(along, aside, gripper, turned[robot], commands[robot])
         finish_command(rows[robot], memories[robot], commands[robot])
+        if outputs.shape[1] > N_OUTPUTS:
+            commands[robot, N_OUTPUTS + 1 :] = outputs[robot, N_OUTPUTS:]  # a turn is between
 
 
 @kernel

@@ -24,6 +24,7 @@ from swarm_logistics_env.world.motion.memory import (
     remember_row,
     to_frame,
 )
+from swarm_logistics_env.world.motion.voices import N_VOICE_INPUTS, read_voices
 
 N_FAR = 8  # neighbours
 N_NEAR = 3  # near ones
@@ -65,7 +66,14 @@ INPUT: Any = _Columns(*range(len(INPUTS)))  # the column of each input
 LEAD = slice(INPUT.lead_present, INPUT.lead_timer + 1)
 # Of a network with a role, behind the others.
 ROLE_INPUTS = ("role", "role_edge")
-ROLE = len(INPUTS)  # the column of the first of them
+N_ROLE_INPUTS = len(ROLE_INPUTS)
+N_INPUTS = len(INPUTS)
+LEAST_OF_TALKING = N_INPUTS + N_VOICE_INPUTS
+
+
+def n_inputs(has_role: bool, talks: bool) -> int:
+    """Return how many inputs a network reads: those of the role, then of voices, come last."""
+    return N_INPUTS + N_ROLE_INPUTS * has_role + N_VOICE_INPUTS * talks
 
 
 @inlined_kernel
@@ -99,7 +107,7 @@ def read_observations(
     inputs: NDArray[np.float32],
     turned: NDArray[np.float64],
 ) -> None:
-    """Do as `turn_frames`, and fill inputs (N, len(INPUTS)), or with `ROLE_INPUTS` behind them.
+    """Do as `turn_frames`, and fill inputs (N, `n_inputs`).
 
     Args:
         counts: the decisions of each row before this one (N,).
@@ -129,10 +137,12 @@ def read_observations(
         angle = random_heading(keys[robot], counts[robot], period) - turned[robot]
         read[INPUT.whim_along], read[INPUT.whim_aside] = math.cos(angle), math.sin(angle)
         read_memory(memory, certainty, confidence, kept_home, frame, read)
-        if inputs.shape[1] > ROLE:
+        if inputs.shape[1] >= LEAST_OF_TALKING:
+            read_voices(sensed, frame, inputs.shape[1] - N_VOICE_INPUTS, read)
+        if inputs.shape[1] != N_INPUTS and inputs.shape[1] != LEAST_OF_TALKING:
             role = role_of(keys[robot], random_heading_number(counts[robot], period))
-            read[ROLE] = 2.0 * role - 1.0
-            read[ROLE + 1] = 1.0 if role < ROLE_EDGE else -1.0
+            read[N_INPUTS] = 2.0 * role - 1.0
+            read[N_INPUTS + 1] = 1.0 if role < ROLE_EDGE else -1.0
 
 
 @inlined_kernel

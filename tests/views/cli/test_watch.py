@@ -111,8 +111,9 @@ def test_the_browser_opens_at_a_terminal_with_a_screen(
 
 @pytest.mark.parametrize("words", ["--set n_robots=5", "--show-fault"])
 def test_replay_is_written_without_a_server(words: str, command: Command) -> None:
-    assert ": 3 s, " in command(f"watch {words} --save run.html --until 3")
+    printed = command(f"watch {words} --save run.html --until 3")
     page = Path("run.html").read_text(encoding="utf-8")
+    assert printed == f"run.html: 3 s, {len(page) / 1e6:.2f} MB\n"
     assert "script-src 'sha256-" in page
     assert "http://" not in page
     assert "src=" not in page.replace("'none'; script-src", "")

@@ -190,6 +190,15 @@ def test_the_urgent_order_comes_first_and_one_that_is_open_stays(build: Build) -
     assert requested_items(world) == [0, 1, 2, 3]
 
 
+def test_of_fewer_orders_than_requests_at_a_time_each_is_put_back_once_a_time_out(
+    build: Build,
+) -> None:
+    fields: dict[str, Any] = {"orders": file_of("0,0,,", "9,1,,"), "request_timeout": 0.2}
+    world = build([(1.0, 1.0)], [FAR] * 3, n_requests=3, **fields)
+    steps(world, STAY, times=7)
+    assert world.state.order_measures.put_back == 3
+
+
 def test_classes_and_docks_of_a_file_are_kept() -> None:
     orders = file_of("0,A,B", "0,B,", "0,C,A", header="time,item,dock")
     scenario = Scenario(
