@@ -13,10 +13,7 @@ from tests.conftest import Check
 HEAD = "robots,fault,faulty,P\n"
 ROWS = "8,none,0,20\n8,none,0,22\n8,jam,1,14\n8,jam,1,15\n8,removed,1,17\n8,removed,1,18\n"
 LIMIT = "robots,fault,faulty,time to finish,finished\n"
-WIDE = (
-    "robots,seed,none [boxes],jam 1 of 8 [boxes],removed 1 of 8 [boxes]\n"
-    "8,1,20,14,17\n8,2,22,15,18\n"
-)
+WIDE = "seed,none [boxes],jam 1 of 8 [boxes],removed 1 of 8 [boxes]\n1,20,14,17\n2,22,15,18\n"
 LOG = "trial,robots,duration,time\n1,4,60,5\n1,4,60,9.5\n2,4,60,\n3,4,60,59\n3,4,60,60\n"
 # By a name: a text, and how it is read.
 TRIALS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -153,7 +150,8 @@ def test_trials_are_read_as_recorded(tmp_path: Path, check_recorded: Check) -> N
         try:
             trials = read_trials(path, **reading)
         except SwarmLogisticsError as error:
-            lines.append(f"{type(error).__name__}: {error}".replace(str(tmp_path), "HERE"))
+            message = str(error).replace(str(tmp_path), "HERE")
+            lines += f"{type(error).__name__}: {message}".splitlines()
             continue
         lines += [f"{column.name} is {column.use}: {column.values}" for column in trials.columns]
         lines += [*trials.notes, f"P is {trials.performance_name}"]
