@@ -112,9 +112,8 @@ def run_compiler(command: Sequence[str], path: Path) -> str:
     """
     try:
         environment = os.environ | {"LC_ALL": "C"}
-        done = subprocess.run(
-            command, capture_output=True, text=True, errors="replace", env=environment
-        )
+        # A text, as `errors` says.
+        done = subprocess.run(command, capture_output=True, errors="replace", env=environment)
     except OSError as error:
         raise PolicyError(
             f"cannot run the compiler {command[0]}: {error.strerror or error}"

@@ -114,8 +114,9 @@ def test_a_fault_that_changes_no_run_is_no_evidence_and_seeds_of_estimates_are_f
 
 
 def test_every_role_is_searched_at_every_time_at_which_robots_may_have_it() -> None:
-    faults = Attack("swarm-dt", SCENARIO, modes=("FM4",)).faults()
-    times = [(onset, lasts) for onset in (0.0, 6.0, 12.0, 18.0) for lasts in (None, 6.0, 12.0)]
+    scenario = SCENARIO.replace(duration=30.2)
+    faults = Attack("swarm-dt", scenario, modes=("FM4",)).faults()
+    times = [(onset, lasts) for onset in (0.0, 6.0, 12.1, 18.1) for lasts in (None, 6.0, 12.1)]
     assert {(fault.role, fault.onset, fault.duration) for fault in faults} == {
         (role, *time)
         for role, time in product((None, *ROLES), times)

@@ -303,3 +303,8 @@ def test_the_same_outcomes_are_looked_at_once(monkeypatch: pytest.MonkeyPatch) -
     assert study._judged
     study.specification = study.specification.replace(margin=0.2)
     assert study.findings().verdicts != results.verdicts  # another plan's looks
+
+
+def test_it_says_where_its_runs_are(tmp_path: Path) -> None:
+    assert repr(Study(name="mine", seeds=2)) == "Study('mine', in memory)"
+    assert repr(Study(name="mine", seeds=2, out=tmp_path)) == f"Study('mine', in {tmp_path})"

@@ -18,7 +18,7 @@ from swarm_logistics_env.study.verdicts.results import StudyResults, judge
 from swarm_logistics_env.study.verdicts.verdict import Verdict
 from swarm_logistics_env.world.warehouse.contacts import ContactMeasures
 from tests.conftest import SMALL
-from tests.made_up import decided, judged, paper, published
+from tests.made_up import decided, delivered, judged, paper, published
 
 pytestmark = pytest.mark.unmeasured
 
@@ -203,3 +203,10 @@ def test_ft_of_a_fault_that_changes_no_run_is_what_the_removed_robots_cost() -> 
     assert ft.problem is None
     assert ft.estimate is not None
     assert not ft.estimate.identical
+
+
+def test_a_study_that_is_called_as_its_policy_names_it_all_the_same() -> None:
+    study = Study(name="homing", policies=["homing"], seeds=2, sizes=[{"values": [5, 10]}])
+    results = judged(study, lambda _, setting, seed: delivered(setting.value or 5 + seed))
+    assert results.policies == ("homing",)
+    assert not results.names_no_policy

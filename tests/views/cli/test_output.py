@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import subprocess
@@ -117,6 +118,32 @@ def test_nothing_is_lost_where_nobody_reads(closed: Sequence[int], folder: Path)
     # If a text of ours was written into the store, no report can be made of it.
     assert run("judge t.csv --out o", "study report o", "judge nosuch.csv", **streams) == 2
     assert {"report.md", "study.sqlite"} <= {path.name for path in Path("o").iterdir()}
+
+
+@pytest.mark.parametrize(
+    ("platform", "number", "is_told"),
+    [("win32", errno.EINVAL, False), ("win32", errno.ENOSPC, True), ("linux", errno.EINVAL, True)],
+)
+def test_on_windows_an_invalid_argument_means_that_nobody_reads(
+    platform: str, number: int, is_told: bool, tmp_path: Path
+) -> None:
+    class Broken(io.FileIO):
+        def write(self, data: Any) -> int:
+            raise OSError(number, "broken")
+
+    numbers: list[int | None] = []
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(sys, "stdout", io.TextIOWrapper(Broken(tmp_path / "stdout", "w")))
+        patched.setattr(sys, "stderr", io.TextIOWrapper(io.BytesIO()))
+        prepare_output()
+        patched.setattr(sys, "platform", platform)
+        try:
+            sys.stdout.write("text")
+            sys.stdout.flush()
+        except OSError as error:
+            numbers.append(error.errno)
+            patched.setattr(Broken, "write", lambda self, data: len(data))  # it is closed in peace
+    assert numbers == ([number] if is_told else [])
 
 
 def test_output_that_cannot_be_written_is_still_told(folder: Path) -> None:

@@ -1,0 +1,87 @@
+"""What reports say of made-up studies of every kind, word by word, as recorded."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from swarm_logistics_env.study.questions.comparison import Setting
+from swarm_logistics_env.study.report.document import document
+from swarm_logistics_env.study.report.latex import latex_tables
+from swarm_logistics_env.study.report.write import markdown
+from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.tasks.outcome import Outcome
+from swarm_logistics_env.study.verdicts.results import StudyResults
+from tests.conftest import Check
+from tests.made_up import judged, paper
+
+TWO = ["homing", "swarm-dt"]
+EDGE = {
+    "seeds": 12,
+    "policies": ["swarm-dt"],
+    "sizes": [{"values": [5, 10, 20, 40]}],
+}
+
+
+def outcome_of(policy: str, setting: Setting, seed: int) -> Outcome:
+    """Return a run of some deliveries, whose mean goes with the policy and the setting's name."""
+    rng = np.random.default_rng([seed, *map(ord, f"{policy} {setting}")])
+    mean = 8.0 + sum(map(ord, f"{policy} {setting.name}")) % 40
+    n_delivered = int(rng.poisson(mean)) if rng.random() > 0.08 else 0
+    times = np.sort(rng.uniform(0.0, 500.0, n_delivered)).round(1)
+    return Outcome(
+        delivery_times=times,
+        ended_at=500.0,
+        anchoring_seconds=float(rng.poisson(30.0)),
+        contacts_per_robot_minute=float(rng.poisson(50.0)),
+        overlap_share=0.01 * float(rng.poisson(3.0)),
+        digest=f"{policy} {setting} {seed}",
+    )
+
+
+def with_failures(policy: str, setting: Setting, seed: int) -> Outcome:
+    if seed == 1 and setting.kind != "size":
+        return Outcome(error="Traceback\nValueError: nothing is right")
+    return outcome_of(policy, setting, seed)
+
+
+def until_empty(policy: str, setting: Setting, seed: int) -> Outcome:
+    """Return a run that delivers all of twelve items, or some of them."""
+    outcome = outcome_of(policy, setting, seed)
+    times = outcome.delivery_times[:12]
+    is_done = len(times) == 12
+    ended_at = float(times[-1]) if is_done else 500.0
+    return Outcome(delivery_times=times, ended_at=ended_at, all_delivered=is_done)
+
+
+def collapsing(_: str, setting: Setting, seed: int) -> Outcome:
+    """Return a run of a swarm that collapses the more often the larger it is."""
+    size = int(setting.value or 5)
+    collapses = seed < size / 4
+    return Outcome(delivery_times=np.arange(1.0 + seed % 2 if collapses else 2.0 * size + seed % 3))
+
+
+def studies() -> Iterator[tuple[str, StudyResults]]:
+    """Yield results by a name."""
+    yield "paper, one seed", paper(seeds=1)
+    for preset, policies in (("resilience", ["homing"]), ("day", TWO), ("orders", TWO)):
+        yield preset, judged(Study.preset(preset, seeds=6, policies=policies), outcome_of)
+    yield "failures", judged(Study.preset("quick", seeds=4, policies=TWO), with_failures)
+    yield "empty", judged(Study.preset("quick", seeds=6, policies=["homing"]), until_empty)
+    edge: dict[str, Any] = EDGE
+    yield "edge", judged(Study(**edge), collapsing)
+
+
+def test_reports_are_as_recorded(check_recorded: Check) -> None:
+    lines = []
+    for name, results in studies():
+        report = document(results)
+        text = markdown(report)
+        if name in ("day", "edge", "failures"):
+            text += f"\n{latex_tables(report.paper)}"
+        text = re.sub(r"\b[0-9a-f]{12,}\b", "DIGEST", text)
+        lines += [f"#### {name}", *(line for line in text.splitlines() if line)]
+    check_recorded("reports.txt", lines)
