@@ -214,6 +214,7 @@ class LearnedPolicy(RowPolicy, Described):
         self._listens = network.listens
         if network.talks:
             self.ignores = self.ignores - {"neighbour_message"}
+            self.messages = MESSAGES
         deviations = tensors.get("deviations", np.ones(1, np.float32))
         self._noise = deviations * np.float32(network.exploration)
         self.parameters = LearnedParameters(network=network, weights=digest(tensors))
@@ -230,7 +231,7 @@ class LearnedPolicy(RowPolicy, Described):
         """Take what a robot's maker knows: its control period, its body, the size of messages."""
         network = self.card.network
         self._frame = MotionView(scenario, network.listens, network.role, network.talks)
-        self._message_size = scenario.message_size
+        self._message_size = scenario.message_size if network.talks else 0
         self.reset(0, 0)
 
     def begin(self, keys: NDArray[np.uint64]) -> None:
@@ -246,14 +247,14 @@ class LearnedPolicy(RowPolicy, Described):
                 f"{self.card.name}, whose robots tell each other as many numbers"
             )
         self._frame.begin(keys)
-        n_outputs = len(OUTPUTS) + (N_MESSAGES if network.talks else 0)
+        n_outputs = len(OUTPUTS) + len(self.messages)
         self._outputs = np.zeros((len(keys), n_outputs), np.float32)
         self._n_steps = 0
         self._tell_compiled_code()
 
     def memories(self) -> dict[str, NDArray[Any]]:
         """Return all that robots remember, the network's last outputs at the end."""
-        outputs = zip((*OUTPUTS, *MESSAGES), self._outputs.T)
+        outputs = zip((*OUTPUTS, *self.messages), self._outputs.T, strict=True)
         return self._frame.memories() | {f"output_{name}": values for name, values in outputs}
 
     def _tell_compiled_code(self) -> None:

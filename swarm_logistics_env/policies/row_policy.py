@@ -43,10 +43,12 @@ class RowPolicy:
         stream: what the random numbers are for; robot i draws from the stream of
             `row_keys(seed, stream, n)[i]`.
         ignores: the columns of a row that never change a command (`observations.Column.name`).
+        messages: the names of the numbers behind its commands that each robot broadcasts.
     """
 
     stream: str
     ignores: frozenset[str] = frozenset()
+    messages: tuple[str, ...] = ()
 
     def configure(self, scenario: Scenario) -> None:
         """Take what a robot's maker knows; what was begun before is not changed."""

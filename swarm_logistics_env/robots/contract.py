@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -166,7 +166,7 @@ def contract_of(policy: object, scenario: Scenario) -> Contract:
         body=body.values,
         stream=row_policy.stream,
         inputs=inputs,
-        outputs=outputs_of(scenario),
+        outputs=outputs_of(scenario, row_policy.messages),
         # What two robots begin with alike is fixed; the others draw.
         initial_values={
             name: float(first) if first == second else None
@@ -197,8 +197,8 @@ def inputs_of(scenario: Scenario, ignores: frozenset[str]) -> tuple[Input, ...]:
     )
 
 
-def outputs_of(scenario: Scenario) -> tuple[Output, ...]:
-    """Return the parts of a command to the robots of a scenario."""
+def outputs_of(scenario: Scenario, messages: Sequence[str] = ()) -> tuple[Output, ...]:
+    """Return the parts of a command to the robots of a scenario, and the messages behind it."""
     to_the_left = f"to the left at {scenario.max_speed:g} m/s"
     if not scenario.is_holonomic:
         to_the_left = "nothing: such a drive has no motion to the side, so it is always 0"
@@ -207,6 +207,7 @@ def outputs_of(scenario: Scenario) -> tuple[Output, ...]:
         "left": to_the_left,
         "turn": f"to the left at {scenario.max_turn_rate:g} rad/s",
         "gripper": "above 0.5 it closes or holds, below -0.5 it opens, else it stays as it is",
+        **dict.fromkeys(messages, "nothing is done: its radio tells the number to its neighbours"),
     }
     return tuple(
         Output(

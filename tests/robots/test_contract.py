@@ -13,8 +13,15 @@ from swarm_logistics_env import Scenario, Warehouse
 from swarm_logistics_env.core.errors import PolicyError, RobotError
 from swarm_logistics_env.policies import load
 from swarm_logistics_env.policies.catalogue import SCRIPTED
+from swarm_logistics_env.policies.learned import (
+    LearnedPolicy,
+    Network,
+    PolicyCard,
+    tensor_shapes,
+)
 from swarm_logistics_env.policies.policy import start
 from swarm_logistics_env.robots import Contract, check_rows, contract_of
+from swarm_logistics_env.world.motion.voices import MESSAGES
 from swarm_logistics_env.world.observations import unflatten
 
 NAMES = [name for name in SCRIPTED if not getattr(load(name), "needs_state", False)]
@@ -149,3 +156,13 @@ def test_a_log_of_another_width_is_refused() -> None:
         check_rows(contract, log())
     with pytest.raises(RobotError, match="should be a table of numbers"):
         check_rows(contract, [["x"]])
+
+
+def test_what_a_network_tells_stands_behind_its_commands() -> None:
+    network = Network(hidden=(4,), talks=True)
+    tensors = {name: np.zeros(shape, np.float32) for name, shape in tensor_shapes(network).items()}
+    policy = LearnedPolicy(PolicyCard(name="talking", network=network), tensors)
+    contract = contract_of(policy, Scenario(message_size=2))
+    assert [output.name for output in contract.outputs[3:]] == ["gripper", *MESSAGES]
+    assert {part.name: part.used for part in contract.inputs}["neighbour_message"]
+    assert len(contract_of(load("ppo-robust"), Scenario(message_size=2)).outputs) == 4

@@ -66,7 +66,7 @@ def test_where_a_teacher_pulls_ppo_is_paid_for_entropy_less_the_error_beside_it(
 
 @pytest.mark.parametrize("head", ["outputs", "classes"])
 def test_what_a_network_tells_is_learned_from_what_is_so_and_is_told_without_noise(
-    small: Any, head: str
+    small: Any, head: Any
 ) -> None:
     network = Network(hidden=(8,), talks=True, head=head)
     scenario = small().scenario.replace(message_size=N_MESSAGES)

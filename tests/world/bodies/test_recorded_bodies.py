@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from swarm_logistics_env import Fault, Scenario, Warehouse
 from tests.conftest import Check
 
 pytest.importorskip("mujoco")
-SMALL = {
+SMALL: dict[str, Any] = {
     "bodies": "mujoco", "n_robots": 7, "n_items": 9, "warehouse_width": 3.0, "restock": True,
     "warehouse_height": 2.5, "delivery_width": 0.8, "max_speed": 1.0, "max_acceleration": 2.0,
 }  # fmt: skip
@@ -18,7 +20,8 @@ WORLDS = {
     "differential": Scenario(**SMALL, drive="differential", n_obstacles=2),
     "among racks": Scenario(bodies="mujoco", n_robots=6, floor="aisles", max_speed=1.0),
     "of two sizes": Scenario(
-        **SMALL, robot_kinds="porter robot_mass=6.0 robot_radius=0.1, runner:3 drive=differential"
+        **SMALL
+        | {"robot_kinds": "porter robot_mass=6.0 robot_radius=0.1, runner:3 drive=differential"}
     ),
 }
 
