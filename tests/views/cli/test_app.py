@@ -78,6 +78,10 @@ def test_values_are_those_of_json_and_toml(changes: list[str], fields: dict[str,
     assert changed_fields(changes, None) == fields
 
 
+def test_it_offers_no_completion_of_shells(command: Command) -> None:
+    assert "completion" not in command("--help")
+
+
 def test_an_error_of_usage_is_a_line_and_names_the_help(command: Command) -> None:
     missing = command("list", code=2)
     choices = "policies, trainings, faults, studies, scenario"
