@@ -100,6 +100,8 @@ def test_a_study_in_which_nothing_works_is_given_up(sizes: dict[str, Any], proce
     assert re.fullmatch(rf"{re.escape(__file__)}:\d+", tally.place)
     assert len(study.results()) == tally.played
     assert study.run().played == tally.played  # they are tried again, and not the others
+    late = Study(**{**sizes, "policies": [Failing(seeds=range(8))], "seeds": 8}).run(minutes=0.0)
+    assert (late.played, late.failed, late.left, late.gave_up) == (1, 1, 23, False)
 
 
 @pytest.mark.parametrize("failing", [Failing(sizes=[2, 6]), Failing(seeds=range(1, 8))])

@@ -180,7 +180,7 @@ def test_more_pages_than_there_may_be_are_refused(served: Served) -> None:
 
 
 def test_malformed_requests_neither_stop_it_nor_leak_a_path(
-    served: Served, capfd: pytest.CaptureFixture[str]
+    served: Served, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
     rng = random.Random(7)
     token = served.server.token.encode()
@@ -202,6 +202,7 @@ def test_malformed_requests_neither_stop_it_nor_leak_a_path(
     assert answered > 50
     assert ask(served, "")[0] == 200
     assert "Traceback" not in capfd.readouterr().err
+    assert caplog.messages == []
 
 
 def test_where_it_cannot_listen_is_told_in_a_sentence(shared: Served) -> None:
