@@ -91,3 +91,13 @@ def test_what_a_network_tells_is_learned_from_what_is_so_and_is_told_without_noi
     truth = columns[:, network.widths[0] + len(PRIVILEGED) :]
     error = ((estimates - truth) ** 2).mean(dim=1)
     torch.testing.assert_close(judged[2], bare[2] - 0.3 * error)
+
+
+@pytest.mark.parametrize(("exploration", "temperature"), [(0.0, 1.0), (0.5, 0.5)])
+def test_classes_are_drawn_at_the_temperature_of_the_file_or_at_1(
+    small: Any, exploration: float, temperature: float
+) -> None:
+    network = Network(hidden=(8,), head="classes", exploration=exploration)
+    training = small(network=network)
+    policy = make_learner(NetworkView(training), network, training.ppo, 0, "cpu").policy
+    assert policy.temperature == temperature
