@@ -197,7 +197,9 @@ def test_what_cannot_be_compared_is_another_one_each_time(part: Any) -> None:
 
 @pytest.mark.filterwarnings("ignore:You are using the legacy TorchScript-based ONNX export")
 @pytest.mark.filterwarnings("ignore:The feature will be removed")
-def test_a_session_is_its_model_and_not_what_its_file_has_become(tmp_path: Path) -> None:
+def test_a_session_is_its_model_and_not_what_its_file_has_become(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pytest.importorskip("onnx")
     runtime = pytest.importorskip("onnxruntime")
     path = tmp_path / "network.onnx"
@@ -206,9 +208,17 @@ def test_a_session_is_its_model_and_not_what_its_file_has_become(tmp_path: Path)
         torch.onnx.export(linear(seed), (ROWS[:1],), path, dynamo=False)
         return runtime.InferenceSession(path)
 
+    weights = path.with_name("network.onnx.data")  # as larger networks keep them
+    weights.write_bytes(b"weights")
     first = session(0)
     before = value_of(first)
-    assert value_of(session(0)) == before
+    glob = Path.glob
+    with monkeypatch.context() as patched:  # a folder has no order
+        patched.setattr(Path, "glob", lambda *where: reversed(sorted(glob(*where))))
+        assert value_of(session(0)) == before
+    weights.write_bytes(b"others")
+    assert value_of(session(0)) != before
+    weights.write_bytes(b"weights")
     other = value_of(session(1))
     assert len({before, other, value_of(first)}) == 3
     policies.of(first)  # from here on sessions can be pickled, by their files

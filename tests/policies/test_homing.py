@@ -13,6 +13,7 @@ from swarm_logistics_env.policies import load
 from swarm_logistics_env.policies.homing import HomingParameters
 from swarm_logistics_env.policies.homing_stock import Parameters
 from swarm_logistics_env.world import observations as row
+from swarm_logistics_env.world.motion.memory import CLEARING_TIME
 
 EAST, NORTH = (1.0, 0.0), (0.0, 1.0)
 SMALL = Scenario(
@@ -131,7 +132,9 @@ def test_a_robot_whose_patience_is_over_leaves_the_requested_item_to_others_for_
     carrying[:, row.VELOCITY] = 1.0  # it drives, so it is not stuck
     seeing = rows_of(20)
     seeing[:, row.ITEMS : row.ITEMS + 4] = (1.0, 0.1, 0.0, 1.0)
-    grippers = [policy.act(rows)[0, 3] for rows in [carrying] * 80 + [seeing] * 81]
+    grippers = [policy.act(carrying)[0, 3] for _ in range(80)]
+    assert (policy.memories()["clearing"] == CLEARING_TIME).all()
+    grippers += [policy.act(seeing)[0, 3] for _ in range(81)]
     assert grippers[:79] == [1.0] * 79
     assert grippers[79:159] == [-1.0] * 80
     assert grippers[160] == 1.0

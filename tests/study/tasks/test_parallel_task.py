@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -99,7 +100,9 @@ def test_an_event_is_at_the_end_of_its_step_and_tells_runs_apart() -> None:
 def test_a_run_has_the_nearest_number_of_steps_and_one_at_least(
     duration: float, steps: int
 ) -> None:
+    began = time.perf_counter()
     run = only_run(task_of(period=0.5), scenario={"duration": duration}).play()
+    assert 0.0 < run.wall_seconds <= time.perf_counter() - began
     assert (run.error, run.ended_at) == (None, 0.5 * steps)
 
 
