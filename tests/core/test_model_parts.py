@@ -214,7 +214,7 @@ def test_a_session_is_its_model_and_not_what_its_file_has_become(
     before = value_of(first)
     glob = Path.glob
     with monkeypatch.context() as patched:  # a folder has no order
-        patched.setattr(Path, "glob", lambda *where: reversed(sorted(glob(*where))))
+        patched.setattr(Path, "glob", lambda *where: sorted(glob(*where), reverse=True))
         assert value_of(session(0)) == before
     weights.write_bytes(b"others")
     assert value_of(session(0)) != before

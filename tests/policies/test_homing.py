@@ -126,7 +126,7 @@ def test_who_holds_keeps_its_item_and_who_stocks_puts_it_down_before_the_area() 
 
 
 def test_a_robot_whose_patience_is_over_leaves_the_requested_item_to_others_for_as_long() -> None:
-    policy = load("homing-stock", patience=7.95)
+    policy: Any = load("homing-stock", patience=7.95)
     policy.reset(20, 0)
     carrying = loaded(rows_of(20))
     carrying[:, row.VELOCITY] = 1.0  # it drives, so it is not stuck
