@@ -13,6 +13,7 @@ import pytest
 
 from swarm_logistics_env import Scenario, Warehouse, policies, run_episode
 from swarm_logistics_env.core.errors import PolicyError
+from swarm_logistics_env.policies.evaluation_mode import torch_modules_of
 from swarm_logistics_env.world.motion.actions import ACTIONS
 from swarm_logistics_env.world.observations import N_COLUMNS
 
@@ -93,6 +94,12 @@ def test_so_it_does_in_a_policy_class_of_ones_own_also_when_the_run_fails() -> N
     with pytest.raises(ValueError, match="unpack"):
         run_episode(BRIEF, policy, seed=0)
     assert modes(network) == modes_before
+
+
+def test_of_very_many_parts_those_that_come_first_are_looked_at() -> None:
+    network = module()
+    for n_others, networks in ((900, [network]), (1100, [])):
+        assert torch_modules_of([*(object() for _ in range(n_others)), network]) == networks
 
 
 def test_a_method_that_learns_and_is_called_train_is_not_called() -> None:

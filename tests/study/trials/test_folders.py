@@ -123,3 +123,9 @@ def test_files_whose_names_say_different_things_are_refused(tmp_path: Path) -> N
     write(tmp_path, **{"day=1.csv": DAY, "other.csv": OTHER_DAY})
     with pytest.raises(spi.IndicatorError, match=r"other\.csv names nothing, but .*1\.csv day$"):
         read_trials(tmp_path)
+
+
+def test_a_file_whose_columns_are_named_by_hand_counts(tmp_path: Path) -> None:
+    write(tmp_path, **{"day1.csv": "swarm,boxes\n4,20\n8,35\n"})
+    trials = read_trials(tmp_path, columns={"robots": "swarm", "performance": "boxes"})
+    assert [(row.n_robots, row.performance) for row in trials.rows] == [(4, 20.0), (8, 35.0)]
