@@ -168,6 +168,7 @@ class Charging(RowPolicy, Holding):
             raise PolicyError(f"at = {at}: should be less than until = {until}")
         self.policy = policy
         self.ignores = getattr(policy, "ignores", frozenset()) - OF_BATTERY
+        self.messages = getattr(policy, "messages", ())
         self.stream = getattr(policy, "stream", "charging")
         self._has_battery = False
         self._bodies_of_kinds = np.zeros((1, BODY.stop - BODY.start))

@@ -22,6 +22,7 @@ from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import checked_count
 from swarm_logistics_env.policies.catalogue import load
 from swarm_logistics_env.policies.policy import Policy, decide, one_thread, start
+from swarm_logistics_env.policies.row_policy import refuse_messages
 from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse.faults import FaultLike
 from swarm_logistics_env.wrappers import MotionFrame
@@ -222,6 +223,8 @@ def record(
                 "as what it does is recorded beside these"
             )
     core = SwarmLogisticsEnv(scenario, faults=faults)
+    if frame:
+        refuse_messages(player, "the frame of motion")
     env = MotionFrame(core) if frame else core
     robot = env.possible_agents[0]
     name = policy if isinstance(policy, str) else repr(policy)

@@ -154,6 +154,9 @@ def write_onnx(policy: Policy, path: Path | str, robots: int | None = None) -> N
     Of a network that says classes the output is "logits" (robots, 40), see `motion.classes`, and
     the metadata have "temperature" instead, with which classes are drawn; 0 means the likeliest.
 
+    Of a network that talks two columns more come last: its messages, which are to be cut to
+    [0, 1], and to which no noise is added.
+
     Args:
         policy: a trained one, as `policies.load("ppo-delivery")`.
         path: of the file, which is replaced.

@@ -105,9 +105,9 @@ class Network(_Part):
     @property
     def widths(self) -> list[int]:
         """The numbers of inputs, of each hidden layer's values, and of what the last layer says."""
-        n_of_outputs = N_CLASSES if self.says_classes else len(self.outputs)
-        n_said = n_of_outputs + (N_MESSAGES if self.talks else 0)
-        return [n_inputs(self.role, self.talks), *self.hidden, n_said]
+        n_answers = N_CLASSES if self.says_classes else len(self.outputs)
+        n_messages = N_MESSAGES if self.talks else 0
+        return [n_inputs(self.role, self.talks), *self.hidden, n_answers + n_messages]
 
 
 class Score(_Part):

@@ -66,7 +66,7 @@ class RowPolicy:
         raise NotImplementedError
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return commands (N, 4) for observation rows (N, D)."""
+        """Return commands (N, 4) for observation rows (N, D), with `messages` behind them."""
         raise NotImplementedError
 
     def reset(self, n_robots: int, seed: int) -> None:
@@ -105,6 +105,20 @@ def refuse_kinds(scenario: Scenario, what: str) -> None:
         raise PolicyError(
             f"robot_kinds = {names}: {what} is for one body: should be of scenario.of_robot(i), "
             "where robot i is of the kind that is meant"
+        )
+
+
+def refuse_messages(policy: object, what: str) -> None:
+    """Refuse a policy whose robots tell each other messages for what carries none.
+
+    Raises:
+        PolicyError: they do.
+    """
+    messages = getattr(policy, "messages", ())
+    if messages:
+        raise PolicyError(
+            f"policy = {policy!r}: its robots tell each other {' and '.join(messages)}, and {what} "
+            "carries no messages: should be a policy that tells none"
         )
 
 
@@ -156,13 +170,13 @@ class Robot:
 
     @_as_compiled
     def step(self, row: ArrayLike) -> NDArray[np.float64]:
-        """Return the command (4,) upon what it senses now, once a period.
+        """Return the command (4,) upon what it senses now, once a period, its messages behind it.
 
         Args:
             row: of `n_columns(body)` numbers, see `observations.columns`.
 
         Returns:
-            Forward, left, turn and gripper, each in [-1, 1].
+            Forward, left, turn and gripper, each in [-1, 1], then `messages`.
 
         Raises:
             PolicyError: the row has another length, or a number in it is not finite. The memory

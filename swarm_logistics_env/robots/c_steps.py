@@ -18,6 +18,7 @@ from swarm_logistics_env.policies.layers import Layers, run_network
 from swarm_logistics_env.policies.learned import STREAM, LearnedPolicy
 from swarm_logistics_env.policies.network_steps import decide
 from swarm_logistics_env.policies.policy import Policy
+from swarm_logistics_env.policies.row_policy import refuse_messages
 from swarm_logistics_env.policies.swarm_dt import SwarmDT, decide_swarm_dt
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.frame import OUTPUTS, command_rows, hold_rows
@@ -129,8 +130,7 @@ def step_of(policy: Policy, scenario: Scenario) -> Step:
 
 def _network_step(policy: LearnedPolicy, period: Known) -> Step:
     network = policy.card.network
-    if network.talks:
-        raise PolicyError("network.talks: no network that talks is written in C yet")
+    refuse_messages(policy, "a controller in C")
     arguments = (
         _ROW, period, MEMORY, _COUNT, _TURNED, KEY, Known(network.listens, "LISTENS", True),
         Known(policy._layers, "layers", True), Known(policy._noise, "noise", True),

@@ -77,7 +77,8 @@ class Output(_Part):
     Args:
         column: its place, from 0 on.
         low, high: its limits.
-        high_means: what `high` does, in the unit of the motor; what `low` does is the opposite.
+        high_means: what `high` does, in the unit of the motor; what `low` does is the opposite, or
+            nothing where it is 0.
     """
 
     name: str
@@ -207,14 +208,14 @@ def outputs_of(scenario: Scenario, messages: Sequence[str] = ()) -> tuple[Output
         "left": to_the_left,
         "turn": f"to the left at {scenario.max_turn_rate:g} rad/s",
         "gripper": "above 0.5 it closes or holds, below -0.5 it opens, else it stays as it is",
-        **dict.fromkeys(messages, "nothing is done: its radio tells the number to its neighbours"),
+        **dict.fromkeys(messages, "its radio tells its neighbours 1: it is there"),
     }
     return tuple(
         Output(
             name=name,
             kind=KINDS.get(name, ""),
             column=column,
-            low=-1.0,
+            low=0.0 if name in messages else -1.0,
             high=1.0,
             high_means=meaning,
         )

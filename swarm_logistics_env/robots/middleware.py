@@ -17,7 +17,7 @@ from swarm_logistics_env.core.errors import RobotError
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.core.streams import generator
 from swarm_logistics_env.policies.catalogue import load
-from swarm_logistics_env.policies.row_policy import Robot, check_row_policy
+from swarm_logistics_env.policies.row_policy import Robot, check_row_policy, refuse_messages
 from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse.commands import MESSAGE
 
@@ -177,7 +177,7 @@ class OverMiddleware:
         settings: the fields of `Middleware`.
 
     Raises:
-        PolicyError: there is no such policy, or it does not decide from rows alone.
+        PolicyError: there is no such policy, it does not decide from rows alone, or it talks.
         RobotError: a setting cannot be.
 
     Example:
@@ -189,6 +189,7 @@ class OverMiddleware:
         self._name = policy
         self._middleware = Middleware(**settings)
         self._policy = check_row_policy(load(policy))
+        refuse_messages(self._policy, "middleware")
         self._scenario = Scenario.preset("paper")
         self.reset(0, 0)
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarm_logistics_env.core.errors import SwarmLogisticsError
-from swarm_logistics_env.policies.row_policy import Robot, check_row_policy
+from swarm_logistics_env.policies.row_policy import Robot, check_row_policy, refuse_messages
 from swarm_logistics_env.robots import ros_messages
 from swarm_logistics_env.robots.fault_layer import FaultLayer
 from swarm_logistics_env.robots.middleware import RobotOverMiddleware
@@ -69,6 +69,7 @@ class RobotNode:
         robot = Robot(policy, body, body.control_period, seed, number)
         self._robot = RobotOverMiddleware(robot, stop_after)
         self._ignores = check_row_policy(policy).ignores
+        refuse_messages(policy, "ROS 2")
         self._body = body.of_robot(number)
         self._number = number
         self._layer = FaultLayer(faults, body, number, seed) if faults else None

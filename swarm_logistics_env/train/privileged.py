@@ -2,7 +2,7 @@
 
 That is more than a robot can sense, such as where the requested item is: the value network judges
 while the policy learns and is not shipped (an asymmetric critic, Pinto et al. 2018). The network
-that decides never sees this.
+that decides never reads this; one that talks learns to tell some of it (`messages_of`).
 """
 
 from __future__ import annotations
@@ -44,19 +44,23 @@ class PrivilegedColumns(NamedTuple):
 
 
 PRIVILEGED = PrivilegedColumns(*range(len(PrivilegedColumns._fields)))
-_UNIT = 10.0  # [m] of these lengths
+_NEARNESS = PRIVILEGED.requested_nearness
 
 
 def messages_of(privileged: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return what networks that talk should say (rows, 2), see `world.motion.voices`.
 
+    Of several requested items it is the nearest one that counts, and 0 if that one is carried.
+
     Args:
         privileged: (rows, len(PRIVILEGED)).
     """
-    along, aside = privileged[:, [PRIVILEGED.requested_along, PRIVILEGED.requested_aside]].T
-    is_to_be_had = ((along != 0.0) | (aside != 0.0)) & (privileged[:, PRIVILEGED.is_carried] == 0.0)
-    to_item = np.where(is_to_be_had, _UNIT * privileged[:, PRIVILEGED.requested_distance], SILENT)
-    to_dock = -_UNIT * privileged[:, PRIVILEGED.to_delivery]
+    # Zeros where nothing is asked for.
+    of_request = [PRIVILEGED.requested_along, PRIVILEGED.requested_aside, _NEARNESS]
+    is_requested = (privileged[:, of_request] != 0.0).any(axis=1)
+    is_free = is_requested & (privileged[:, PRIVILEGED.is_carried] == 0.0)
+    to_item = np.where(is_free, 10.0 * privileged[:, PRIVILEGED.requested_distance], SILENT)
+    to_dock = -10.0 * privileged[:, PRIVILEGED.to_delivery]
     nearness = 1.0 - np.stack([to_item, to_dock], axis=1) / SILENT
     return np.clip(nearness, 0.0, 1.0).astype(np.float32)
 

@@ -99,9 +99,16 @@ class Training(Part):
     def _check_consistency(self) -> Self:
         size = N_MESSAGES if self.network.talks else 0
         scenarios = [self.scenario, *(scenario for _, scenario in self.each_world)]
-        if any(scenario.message_size != size for scenario in scenarios):
-            reason = f"network.talks = {str(self.network.talks).lower()}"
-            raise ValueError(f"scenario.message_size: should be {size}, as {reason}")
+        reason = f"network.talks = {str(self.network.talks).lower()}"
+        for scenario in scenarios:
+            message_size = scenario.message_size
+            if message_size != size:
+                raise ValueError(
+                    f"scenario.message_size = {message_size}: should be {size}, as {reason}"
+                )
+        usual_weight = PPOSettings.model_fields["message_weight"].default
+        if not self.network.talks and self.ppo.message_weight != usual_weight:
+            raise ValueError(f"ppo.message_weight: should be left out, as {reason}")
         self._check_decisions()
         self._check_indicators()
         if self.network.says_classes:

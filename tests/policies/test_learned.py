@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Fault, Scenario, run_episode
 from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.core.streams import row_keys
-from swarm_logistics_env.policies import PolicyCard, identity
+from swarm_logistics_env.policies import PolicyCard, charging, identity
 from swarm_logistics_env.policies.layers import hyperbolic_tangent
 from swarm_logistics_env.policies.learned import LearnedPolicy, tensor_shapes
 from swarm_logistics_env.policies.network_steps import explore
 from swarm_logistics_env.policies.policy import start
+from swarm_logistics_env.policies.row_policy import refuse_messages
 from swarm_logistics_env.world.motion import INPUTS
+from swarm_logistics_env.world.motion.voices import MESSAGES
 from swarm_logistics_env.world.observations import N_COLUMNS, TURN_RATE
 from swarm_logistics_env.world.warehouse import Warehouse
 
@@ -168,10 +170,11 @@ def test_it_steers_the_body_that_the_robots_of_a_scenario_have(
     assert not turns(Scenario(n_robots=4, drive="holonomic"))
 
 
-@pytest.fixture
-def talking(card: PolicyCard) -> LearnedPolicy:
+@pytest.fixture(params=["outputs", "classes"])
+def talking(card: PolicyCard, request: pytest.FixtureRequest) -> LearnedPolicy:
     """A network of drawn numbers that talks."""
-    network = card.network.replace(talks=True, role=True, exploration=0.0)
+    changes = {"role": True, "exploration": 0.3, "decides_every": 2, "head": request.param}
+    network = card.network.replace(talks=True, **changes)
     rng = np.random.default_rng(1)
     tensors = {
         name: rng.normal(0.0, 0.3, shape).astype(np.float32)
@@ -204,8 +207,14 @@ def test_a_network_that_talks_tells_its_neighbours_two_numbers_and_hears_them(
     commands = talking.act(rows)
     assert commands.shape == (6, 6)
     assert ((commands[:, 4:] >= 0.0) & (commands[:, 4:] <= 1.0)).all()
-    warehouse.step(commands)
+    rows = warehouse.step(commands)
     np.testing.assert_allclose(warehouse.state.robot_message, commands[:, 4:])
+    other = copy.deepcopy(talking)
+    again = talking.act(rows)
+    np.testing.assert_array_equal(again[:, 4:], commands[:, 4:])  # between two decisions
+    np.testing.assert_array_equal(other.act(rows), again)
+    with pytest.raises(PolicyError, match="of 141 columns: should be at least 157"):
+        talking.act(rows[:, :N_COLUMNS])
     assert talking.memories()["output_dock_nearness"].tolist() == commands[:, 5].tolist()
 
 
@@ -215,6 +224,9 @@ def test_a_network_that_talks_plays_where_messages_have_its_size_and_cards_say_s
     with pytest.raises(PolicyError, match="message_size = 0: should be 2 for"):
         run_episode(Scenario(n_robots=2, duration=1.0), talking, seed=0)
     assert "neighbour_message" not in talking.ignores
+    with pytest.raises(PolicyError, match="item_nearness and dock_nearness, and ROS carries no"):
+        refuse_messages(talking, "ROS")
+    assert charging(talking).messages == talking.messages == MESSAGES
     assert "neighbour_message" in LearnedPolicy.ignores
     assert talking.card.network.model_dump()["talks"] is True
     assert "talks" not in talking.card.network.replace(talks=False).model_dump()

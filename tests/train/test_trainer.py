@@ -39,6 +39,7 @@ from swarm_logistics_env.train.training_worlds import NetworkView
 from swarm_logistics_env.views.cli import app
 from swarm_logistics_env.world.motion import INPUTS, MotionView
 from swarm_logistics_env.world.motion.classes import GROUPS
+from swarm_logistics_env.world.motion.voices import N_MESSAGES
 
 
 def weights(path: Path) -> dict[str, bytes]:
@@ -103,19 +104,29 @@ def test_scores_that_could_not_be_measured_are_told_and_measured_by_the_next_cal
     assert later.versions["simulation"] == trained_with
 
 
+@pytest.mark.parametrize("talks", [False, True])
 @pytest.mark.parametrize("head", ["outputs", "classes"])
-def test_torch_and_the_policy_file_agree(small: Any, head: str) -> None:
-    training = small(network={"hidden": (8,), "head": head})
+def test_torch_and_the_policy_file_agree(small: Any, head: str, talks: bool) -> None:
+    network = {"hidden": (8,), "head": head, "talks": talks}
+    scenario = small().scenario.replace(message_size=N_MESSAGES if talks else 0)
+    training = small(network=network, scenario=scenario)
+    n_inputs = training.network.widths[0]
     learner = make_learner(NetworkView(training), training.network, training.ppo, 0, "cpu")
     with torch.no_grad():
         for parameter in learner.policy.parameters():
             parameter.add_(0.3 * torch.randn_like(parameter))
     card = PolicyCard(name="x", network=training.network)
     outputs_of = LearnedPolicy(card, tensors_of(learner.policy)).outputs_of
-    inputs = np.random.default_rng(0).normal(size=(300, len(INPUTS) + len(PRIVILEGED)))
+    n_columns = n_inputs + len(PRIVILEGED) + (N_MESSAGES if talks else 0)
+    columns = np.random.default_rng(0).normal(size=(300, n_columns)).astype(np.float32)
     # What PPO takes for the most likely action.
-    likely, _ = learner.predict(inputs.astype(np.float32), deterministic=True)
-    outputs = outputs_of(inputs[:, : len(INPUTS)].astype(np.float32))
+    likely, _ = learner.predict(columns, deterministic=True)
+    outputs = outputs_of(columns[:, :n_inputs])
+    if talks:
+        messages = learner.policy.messages_of(torch.from_numpy(columns[:, :n_inputs]))
+        np.testing.assert_allclose(outputs[:, -N_MESSAGES:].clip(0.0, 1.0), messages, atol=1e-5)
+        assert 0.0 < messages.mean() < 1.0
+        outputs = outputs[:, :-N_MESSAGES]
     if head == "classes":
         groups = np.split(outputs, np.cumsum(GROUPS)[:-1], axis=1)
         outputs = np.stack([group.argmax(axis=1) for group in groups], axis=1)

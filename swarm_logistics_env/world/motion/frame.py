@@ -23,6 +23,7 @@ from swarm_logistics_env.world.motion.memory import (
     to_frame,
 )
 from swarm_logistics_env.world.motion.steering import clear_the_way, steer
+from swarm_logistics_env.world.motion.voices import N_MESSAGES
 from swarm_logistics_env.world.scenario import Scenario
 
 from .network_inputs import COSINES, SINES, TURNS, n_inputs, read_observations
@@ -40,7 +41,7 @@ class MotionView:
         scenario: for its control period and for what robots know of their bodies.
         listens: whether the lowest timer heard is read; zeros if not, so that no liar leads.
         has_role: whether `ROLE_INPUTS` stand behind the other inputs.
-        talks: whether rows end with messages, `VOICE_INPUTS` stand behind the other inputs, and
+        talks: whether rows have messages, `VOICE_INPUTS` stand behind the other inputs, and
             `MESSAGES` behind the outputs.
 
     Attributes:
@@ -61,6 +62,7 @@ class MotionView:
         self.period = scenario.control_period
         self._bodies = bodies_of(scenario)
         self._listens = listens
+        self._n_columns = row.MESSAGES + (row.N_NEIGHBOURS * N_MESSAGES if talks else 0)
         self._n_inputs = n_inputs(has_role, talks)
         self.begin(np.empty(0, np.uint64))
 
@@ -101,7 +103,7 @@ class MotionView:
         """Return the inputs (N, k) of the next decision; memories and time go on.
 
         Raises:
-            PolicyError: there are more or fewer rows than keys at `begin`.
+            PolicyError: there are more or fewer rows than keys at `begin`, or columns are missing.
         """
         self.check(observations)
         inputs = self._inputs(observations, self.memory, self.keys, self.counts, self.turned)
@@ -113,17 +115,22 @@ class MotionView:
         """Let memories and time go on between two decisions; outputs keep their direction.
 
         Raises:
-            PolicyError: there are more or fewer rows than keys at `begin`.
+            PolicyError: there are more or fewer rows than keys at `begin`, or columns are missing.
         """
         self.check(observations)
         hold_rows(observations, self.period, self.memory, self.counts, self.turned)
         self.rows = observations
 
     def check(self, observations: NDArray[np.float32]) -> None:
-        """Raise PolicyError if there are more or fewer rows than keys at `begin`."""
+        """Raise PolicyError if there are more or fewer rows than keys, or columns are missing."""
         if len(observations) != len(self.keys):
             raise PolicyError(
                 f"observations of {len(observations)} robots: reset was told {len(self.keys)}"
+            )
+        if observations.shape[1] < self._n_columns:
+            raise PolicyError(
+                f"observations of {observations.shape[1]} columns: should be at least "
+                f"{self._n_columns}"
             )
 
     def peek(

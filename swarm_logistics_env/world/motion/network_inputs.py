@@ -68,7 +68,7 @@ LEAD = slice(INPUT.lead_present, INPUT.lead_timer + 1)
 ROLE_INPUTS = ("role", "role_edge")
 N_ROLE_INPUTS = len(ROLE_INPUTS)
 N_INPUTS = len(INPUTS)
-LEAST_OF_TALKING = N_INPUTS + N_VOICE_INPUTS
+FEWEST_TALKING_INPUTS = N_INPUTS + N_VOICE_INPUTS
 
 
 def n_inputs(has_role: bool, talks: bool) -> int:
@@ -137,9 +137,10 @@ def read_observations(
         angle = random_heading(keys[robot], counts[robot], period) - turned[robot]
         read[INPUT.whim_along], read[INPUT.whim_aside] = math.cos(angle), math.sin(angle)
         read_memory(memory, certainty, confidence, kept_home, frame, read)
-        if inputs.shape[1] >= LEAST_OF_TALKING:
+        # How many there are says which: compiled code leaves out what a network does not read.
+        if inputs.shape[1] >= FEWEST_TALKING_INPUTS:
             read_voices(sensed, frame, inputs.shape[1] - N_VOICE_INPUTS, read)
-        if inputs.shape[1] != N_INPUTS and inputs.shape[1] != LEAST_OF_TALKING:
+        if inputs.shape[1] != N_INPUTS and inputs.shape[1] != FEWEST_TALKING_INPUTS:
             role = role_of(keys[robot], random_heading_number(counts[robot], period))
             read[N_INPUTS] = 2.0 * role - 1.0
             read[N_INPUTS + 1] = 1.0 if role < ROLE_EDGE else -1.0

@@ -30,7 +30,7 @@ _FAR = 4.0  # [m]: the nearness of a sender ends there
 def read_voices(
     sensed: NDArray[np.float32], frame: tuple[float, float], first: int, read: NDArray[np.float32]
 ) -> None:
-    """Fill `VOICE_INPUTS` of a row (D,) that ends with messages, from column `first` on."""
+    """Fill `VOICE_INPUTS` of a row (D,) that has messages, from column `first` on."""
     for message in range(N_MESSAGES):
         column = first + _N_OF_MESSAGE * message
         read[column : column + _N_OF_MESSAGE] = 0.0

@@ -19,10 +19,11 @@ from pydantic import NonNegativeFloat, NonNegativeInt
 
 from swarm_logistics_env.compiler.kernels import inlined_kernel, kernel, uniform
 
-from .demand import ask, close_request, drawn_item, next_dock, next_item
+from .demand import ask, close_request, drawn_item, is_ordered, next_dock, next_item
 from .structs import (
     ASKED,
     CAME,
+    DELIVERED,
     DOCK,
     DUE,
     ITEM_ORDERED,
@@ -97,10 +98,18 @@ def read_listed(world: World) -> None:
         item = int(order[ITEM_ORDERED])
         if item == NOBODY:
             item = drawn_item(world, int(order[NUMBER]), orders.n_classes[0])
+        elif not world.parameters.restock and is_gone(world, item):
+            item = NOBODY
         dock = int(order[DOCK])
         if dock == NOBODY:
             dock = next_dock(world)
         let_wait(world, item, dock, order)
+
+
+@kernel
+def is_gone(world: World, item: int) -> bool:
+    """Return whether an item was delivered for good, or is on order."""
+    return bool(world.items.status[item] == DELIVERED or is_ordered(world, item))
 
 
 @kernel

@@ -19,7 +19,7 @@ from tests.conftest import Check
 from tests.made_up import judged, paper
 
 TWO = ["homing", "swarm-dt"]
-EDGE = {
+EDGE: dict[str, Any] = {
     "seeds": 12,
     "policies": ["swarm-dt"],
     "sizes": [{"values": [5, 10, 20, 40]}],
@@ -71,8 +71,7 @@ def studies() -> Iterator[tuple[str, StudyResults]]:
         yield preset, judged(Study.preset(preset, seeds=6, policies=policies), outcome_of)
     yield "failures", judged(Study.preset("quick", seeds=4, policies=TWO), with_failures)
     yield "empty", judged(Study.preset("quick", seeds=6, policies=["homing"]), until_empty)
-    edge: dict[str, Any] = EDGE
-    yield "edge", judged(Study(**edge), collapsing)
+    yield "edge", judged(Study(**EDGE), collapsing)
 
 
 def test_reports_are_as_recorded(check_recorded: Check) -> None:

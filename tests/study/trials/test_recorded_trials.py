@@ -159,7 +159,6 @@ def test_trials_are_read_as_recorded(tmp_path: Path, check_recorded: Check) -> N
             lines.append(f"references {trials.references}, blocks {trials.blocks}")
         for trial in trials.rows:
             values = dataclasses.asdict(trial).items()
-            lines.append(
-                ", ".join(f"{key} {value}" for key, value in values if value or key == "P")
-            )
+            texts = (f"{key} {value}" for key, value in values if value not in (None, "", ()))
+            lines.append(", ".join(texts))
     check_recorded("trials.txt", lines)

@@ -121,11 +121,11 @@ def test_nothing_is_lost_where_nobody_reads(closed: Sequence[int], folder: Path)
 
 
 @pytest.mark.parametrize(
-    ("platform", "number", "is_told"),
+    ("platform", "number", "is_raised"),
     [("win32", errno.EINVAL, False), ("win32", errno.ENOSPC, True), ("linux", errno.EINVAL, True)],
 )
 def test_on_windows_an_invalid_argument_means_that_nobody_reads(
-    platform: str, number: int, is_told: bool, tmp_path: Path
+    platform: str, number: int, is_raised: bool, tmp_path: Path
 ) -> None:
     class Broken(io.FileIO):
         def write(self, data: Any) -> int:
@@ -143,7 +143,7 @@ def test_on_windows_an_invalid_argument_means_that_nobody_reads(
         except OSError as error:
             numbers.append(error.errno)
             patched.setattr(Broken, "write", lambda self, data: len(data))  # it is closed in peace
-    assert numbers == ([number] if is_told else [])
+    assert numbers == ([number] if is_raised else [])
 
 
 def test_output_that_cannot_be_written_is_still_told(folder: Path) -> None:
