@@ -43,9 +43,12 @@ def test_they_hold_every_decision_of_every_robot_that_is_there() -> None:
     assert rewards == episodes[0].delivered
 
 
-@pytest.mark.parametrize("drive", ["holonomic", "differential"])
-def test_outputs_in_the_frame_ask_for_the_motion_of_the_policy(drive: Any) -> None:
-    scenario = SMALL.replace(drive=drive)
+@pytest.mark.parametrize(
+    "fields",
+    [{"drive": "holonomic"}, {"drive": "differential"}, {"robot_kinds": "a drive=differential, b"}],
+)
+def test_outputs_in_the_frame_ask_for_the_motion_of_the_policy(fields: Any) -> None:
+    scenario = SMALL.replace(**fields)
     recorded = record(HOMING, 1, scenario=scenario, frame=True)
     # Played again from the outputs, the world goes the same way.
     env = MotionFrame(SwarmLogisticsEnv(scenario))

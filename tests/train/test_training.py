@@ -44,6 +44,7 @@ def test_worlds_of_several_kinds_stand_side_by_side() -> None:
     [
         ("agent_step = 5", "Training has no field 'agent_step'; did you mean 'agent_steps'"),
         ("seed =", "is not TOML"),
+        ("seed = 4294967296", "seed = 4294967296: should be less than 4294967296"),
         ("name = '../x'", r"should match pattern '\^\[A-Za-z0-9_-\]"),
         ("network.decides_every = 3", "should divide the control steps of each episode"),
         ("ppo.n_minibatches = 7", "should divide the batch of 150 robots x 128 steps"),

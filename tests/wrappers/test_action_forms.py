@@ -147,6 +147,13 @@ def test_it_reads_and_commands_as_the_frame_of_the_shipped_networks_does() -> No
         assert present.sum() == 2
 
 
+def test_outputs_of_which_any_is_not_finite_are_refused_by_their_name() -> None:
+    env = MotionFrame(small(n_robots=2))
+    env.reset_arrays(0)
+    with pytest.raises(CommandError, match=r"(?s)outputs = .*nan.*: should be finite"):
+        env.step_arrays([[0.5, 0.0, 1.0], [0.5, np.nan, 1.0]])
+
+
 @pytest.mark.parametrize("form", [DiscreteActions, MotionFrame])
 def test_stable_baselines3_takes_either_for_every_row(form: Any) -> None:
     pytest.importorskip("stable_baselines3")

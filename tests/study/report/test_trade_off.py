@@ -75,6 +75,13 @@ def test_a_condition_with_a_run_that_nobody_counted_is_missing_not_0() -> None:
     assert [row[column] for row in table.rows] == ["9.0 [6.5, 11.5]", NOTHING, "9.0 [6.5, 11.5]"]
 
 
+def test_conditions_without_a_contact_have_a_row() -> None:
+    study = Study(policies=["homing"], seeds=3, sizes=[{"values": [5, 10]}])
+    peaceful = judged(study, lambda *_: replace(delivered(7), contacts_per_robot_minute=0.0))
+    (figure,) = trade_off_figure(peaceful)
+    assert figure.data["contacts"].tolist() == [0.0, 0.0]
+
+
 def test_without_any_count_there_is_neither_picture_nor_column() -> None:
     study = Study(policies=["homing"], seeds=3, sizes=[{"values": [5, 10]}])
     older = judged(study, lambda *_: delivered(7))

@@ -60,6 +60,10 @@ def test_runs_in_wide_warehouses_stand_one_above_the_other() -> None:
     height, width, _ = next(Film(takes, 1.0, 1.0, 5.0, 300).frames()).shape
     assert width == 600
     assert height > 2 * 145
+    longer = Take("b", Play(SMALL.replace(warehouse_width=9), policies.load("homing"), 0, []))
+    alone = [next(Film([take], 1.0, 1.0, 5.0, 300).frames()) for take in (takes[0], longer)]
+    both = next(Film([takes[0], longer], 1.0, 1.0, 5.0, 300).frames())
+    assert both.shape[:2] == (sum(map(len, alone)), max(a.shape[1] for a in alone))
 
 
 def test_runs_in_warehouses_of_unlike_shapes_stand_side_by_side() -> None:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario, policies, run_episode
+from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.memory import MEMORY, N_COLUMNS
-from swarm_logistics_env.world.motion.steering import steer
+from swarm_logistics_env.world.motion.steering import clear_the_way, steer
 
 
 @pytest.mark.parametrize("direction", [0.3, 1.5, -0.6, 3.0, -2.0])
@@ -52,3 +53,19 @@ def test_homing_delivers_with_differential_drive() -> None:
         for name in ("homing", "swarm-dt")
     )
     assert homing > 2 * swarm_dt
+
+
+@pytest.mark.parametrize(("requested_at", "takes"), [(None, True), (3.0, True), (0.2, False)])
+def test_who_clears_its_way_takes_an_item_unless_the_requested_one_is_near(
+    requested_at: float | None, takes: bool
+) -> None:
+    sensed = np.zeros(row.N_COLUMNS, np.float32)  # a robot stands right before it
+    sensed[row.ITEMS : row.ITEMS + 3] = 1.0, 0.05, 0.0
+    if requested_at is not None:
+        first = row.ITEMS + row.ITEM_WIDTH
+        sensed[first : first + 4] = 1.0, requested_at, 0.0, 1.0
+    memory, command = np.zeros(N_COLUMNS), np.zeros(4)
+    memory[MEMORY.clearing] = 1.0
+    clear_the_way(sensed, memory, command)
+    assert command[3] == (1.0 if takes else -1.0)
+    assert command[0] == pytest.approx(0.1)
