@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from typing import Any
 
 from swarm_logistics_env import FAILURE_MODES, Scenario, policies
 from swarm_logistics_env.policies.policy import ScriptParameters
@@ -12,6 +13,8 @@ from swarm_logistics_env.study.questions.specification import Specification
 from swarm_logistics_env.study.tasks.performance import MEASURES
 from swarm_logistics_env.train import load_training, preset_names
 from swarm_logistics_env.train.training import Training
+from swarm_logistics_env.views.cli.app import command_line
+from swarm_logistics_env.views.cli.output import PROGRAM
 from swarm_logistics_env.world.rendering import palette
 from swarm_logistics_env.world.scenario import SCENARIO_PRESETS
 from swarm_logistics_env.world.scenario.order_file import ORDER_SHAPES
@@ -44,6 +47,20 @@ def settings() -> Iterator[tuple[str, object]]:
     yield "dark colours", palette.DARK_COLOURS
 
 
+def options(command: Any, name: str) -> Iterator[str]:
+    """Yield what each option of a command, and of those below it, usually is and may be."""
+    for parameter in command.params:
+        names = " ".join([*parameter.opts, *parameter.secondary_opts])
+        usual = getattr(parameter.default, "value", parameter.default)
+        limits = parameter if hasattr(parameter, "min") else parameter.type  # of older typers
+        ends = [getattr(limits, end, None) for end in ("min", "max")]
+        flags = f"required {parameter.required}, repeated {parameter.multiple}"
+        yield f"option {name}, {names}: {usual!r}, within {ends}, {flags}"
+    for below, inner in getattr(command, "commands", {}).items():
+        yield from options(inner, f"{name} {below}")
+
+
 def test_settings_are_as_recorded(check_recorded: Check) -> None:
     lines = [f"{name}: {json.dumps(value)}" for name, value in settings()]
+    lines += options(command_line(), PROGRAM)
     check_recorded("settings.txt", lines)

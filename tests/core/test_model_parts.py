@@ -225,6 +225,20 @@ def test_a_session_is_its_model_and_not_what_its_file_has_become(
     assert deep_copy([first]) == [first]
 
 
+def test_a_session_that_draws_numbers_has_no_stable_value(tmp_path: Path) -> None:
+    onnx = pytest.importorskip("onnx")
+    runtime = pytest.importorskip("onnxruntime")
+    make_node = onnx.helper.make_node
+    nodes = [make_node("RandomUniformLike", ["x"], ["n"]), make_node("Add", ["x", "n"], ["y"])]
+    x, y = (onnx.helper.make_tensor_value_info(n, onnx.TensorProto.FLOAT, [8, 3]) for n in "xy")
+    graph = onnx.helper.make_graph(nodes, "drawing", [x], [y])
+    operators = [onnx.helper.make_opsetid("", 17)]
+    model = onnx.helper.make_model(graph, opset_imports=operators, ir_version=8)
+    onnx.save(model, tmp_path / "drawing.onnx")
+    session = runtime.InferenceSession(tmp_path / "drawing.onnx")
+    assert value_of(session).startswith(UNSTABLE)
+
+
 def test_a_model_of_stable_baselines3_is_what_it_predicts_with(tmp_path: Path) -> None:
     sb3 = pytest.importorskip("stable_baselines3")
     model = sb3.PPO("MlpPolicy", "Pendulum-v1", n_steps=8, batch_size=8, device="cpu", seed=0)

@@ -217,7 +217,10 @@ def test_the_c_file_decides_as_the_policy_does_in_a_quarter_of_a_million_decisio
 def test_it_compiles_without_a_warning_and_takes_little(name: str, tmp_path: Path) -> None:
     files = write_c(policies.load(name), SCENARIO, tmp_path / "robot.c")
     assert sizes_of(files.source, ["gcc", "-DSWARM_DOUBLE"]).flash < 128 * 1024
+    optimized = sizes_of(files.source, ["gcc", "-mtune=generic", "-g"])
+    assert optimized.compiler == "gcc -mtune=generic"
     sizes = sizes_of(files.source, ["gcc"])
+    assert sizes.compiler == "gcc"
     assert sizes.flash < 128 * 1024
     assert sizes.stack is not None
     assert sizes.stack < 4 * 1024

@@ -14,7 +14,7 @@ import pytest
 from swarm_logistics_env import Fault, Scenario
 from swarm_logistics_env.core import progress_bar
 from swarm_logistics_env.core.errors import SetupError
-from swarm_logistics_env.study.attack import STORE, Attack, attack, search
+from swarm_logistics_env.study.attack import STORE, Attack, _covariance, attack, search
 from swarm_logistics_env.study.runs.engines import serial
 from swarm_logistics_env.study.runs.store import Runs
 from swarm_logistics_env.study.tasks.outcome import Outcome
@@ -123,6 +123,20 @@ def test_every_role_is_searched_at_every_time_at_which_robots_may_have_it() -> N
         if time[0] or role in (None, "searching")
     }
     assert len(faults) == 60
+
+
+def test_faults_are_the_more_alike_the_more_they_share() -> None:
+    fault = Fault("FM1", 1, onset=0.0, role="carrier")
+    others = [
+        fault.replace(onset=9.0), fault.replace(role="searching"),
+        fault.replace(role="searching", onset=9.0), Fault("FM2", 1, onset=0.0, role="carrier"),
+    ]  # fmt: skip
+    alike = _covariance([fault, *others])
+    assert np.diag(alike).tolist() == pytest.approx([1.0] * 5)
+    np.testing.assert_array_equal(alike, alike.T)
+    at_another_time, in_another_role, in_both, of_another_mode = alike[0, 1:]
+    assert 1.0 > at_another_time > in_both > of_another_mode == 0.0
+    assert 1.0 > in_another_role > in_both
 
 
 def test_what_was_never_tried_is_not_named() -> None:

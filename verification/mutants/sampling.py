@@ -33,6 +33,8 @@ SECONDS_OF_REACHING = 40.0  # of the tests that run a line; the nearest follow
 LONGEST = 900.0  # [s] of the clock after which the tests of a fault are stopped
 # What worlds and policies do, to the bit: asked of faults in them that no nearer test catches.
 _TRAJECTORIES = "tests/verification/test_trajectories.py"
+# What forms of the environment, views, trainings and commands give, as files hold it: likewise.
+_RECORDED = "test_recorded_*.py"
 # Nodes of ROS 2, which the gate has not: `make ros` tests them.
 _NOT_IN_GATE = ("robots/ros_robot.py", "robots/ros_world.py")
 _COMPILER = ("numba", "llvmlite")  # who imports these changes how kernels are compiled
@@ -260,7 +262,11 @@ def _caught_by(fault: Fault, copy: Path) -> str:
         return test
     # Kernels are compiled, as the interpreter would take minutes.
     anew = fault.interpreted or fault.compiles_anew
-    played = fault._replace(tests=(_TRAJECTORIES,), interpreted=False, compiles_anew=anew)
+    tests = [_TRAJECTORIES]
+    if fault.interpreted:  # which tests run a kernel is in no record
+        paths = sorted((copy / "tests").rglob(_RECORDED))
+        tests += [str(path.relative_to(copy)) for path in paths]
+    played = fault._replace(tests=tuple(tests), interpreted=False, compiles_anew=anew)
     return _caught_by_nearest(played, copy)
 
 

@@ -30,7 +30,7 @@ def attack_command(
     modes: Annotated[Repeated, Option("--mode", help="Mode to search; may be repeated.")] = None,
     budget: Annotated[int, Option(min=10, help="Runs of faults in the search.")] = 200,
     fresh: Annotated[int, Option(min=3, help="Other seeds, for the estimates.")] = 30,
-    seed: Annotated[int, Option(help="Of the search's own choices.")] = 0,
+    seed: Annotated[int, Option(min=0, help="Of the search's own choices.")] = 0,
     preset: PresetOption = None,
     file: ScenarioOption = None,
     changes: SetOption = None,

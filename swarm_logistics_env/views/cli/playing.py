@@ -148,7 +148,7 @@ def watch_command(
     against: Annotated[
         str | None, Option(help="Policy of the run beside it; left out: the same without faults.")
     ] = None,
-    seed: Annotated[int, Option(help="Seed of the first episode.")] = 0,
+    seed: Annotated[int, Option(min=0, help="Seed of the first episode.")] = 0,
     preset: PresetOption = None,
     scenario_file: ScenarioOption = None,
     changes: SetOption = None,

@@ -49,7 +49,7 @@ BodiesOption = Annotated[
         "my.py:Class; as --set bodies=.."
     ),
 ]
-SeedOption = Annotated[int, Option(help="Decides everything random.")]
+SeedOption = Annotated[int, Option(min=0, help="Decides everything random.")]
 FaultOption = Annotated[
     Repeated,
     Option(

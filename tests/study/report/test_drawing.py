@@ -112,6 +112,7 @@ def drawn_scale(values: list[float], thresholds: tuple[float, ...]) -> str:
     [
         ([10.0, 200.0], (), "linear"),
         ([2.0, 200.0], (), "log"),  # P of a small swarm and of a large one
+        ([0.02, 2.0], (), "log"),  # of a throughput
         ([0.0, 200.0], (), "linear"),
         ([-0.6, 0.0, 1.4], (0.0,), "linear"),
         ([-0.6, 0.0, 14.0], (0.0,), "symlog"),

@@ -83,7 +83,7 @@ PRINTED = (
     f"attack homing {SMALL} --budget 10 --fresh 10 --processes 1 --mode FM1 --mode FM4",
 )  # fmt: skip
 REFUSED = (
-    "run --seed two", "run --set n_robots=0",
+    "run --seed two", "run --seed -1", "run --set n_robots=0",
     "run --set max_speed=fast", "run --set speed_mix=[1,2]",
     "run --preset papr", "run --scenario world.toml", "run --scenario broken.toml",
     "run --fault FM1:0", "run --fault FM1:26", "run --fault FM1:1@-5", "run --fault FM1:1@5+0",
