@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from gymnasium.spaces import Box
 
-from swarm_logistics_env import Scenario, policies, run_episode
+from swarm_logistics_env import Scenario, Warehouse, policies, run_episode
 from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.policies import models
@@ -21,7 +21,7 @@ from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.views.cli import app
 from swarm_logistics_env.world.motion.network_inputs import LEAD
-from swarm_logistics_env.world.observations import N_COLUMNS
+from swarm_logistics_env.world.observations import N_COLUMNS, N_NEIGHBOURS
 from swarm_logistics_env.wrappers import FaultInjection, SwarmSize, Wrapper
 
 BRIEF = Scenario(n_robots=3, n_items=10, duration=2.0)
@@ -274,3 +274,17 @@ def test_a_policy_says_what_it_is() -> None:
 
 def test_the_example_of_its_docstring_runs() -> None:
     assert doctest.testmod(models).failed == 0
+
+
+def test_a_model_that_reads_messages_may_send_some() -> None:
+    def network(rows: Any) -> Any:
+        if rows.shape[1] != N_COLUMNS + 2 * N_NEIGHBOURS:
+            raise ValueError("no messages")
+        return np.tile([0.0, 0.0, 0.0, 0.0, 0.25, -0.5], (len(rows), 1))
+
+    world = Warehouse(Scenario(n_robots=3, n_items=2, message_size=2))
+    policy = policies.of(network)
+    rows = world.reset(0)
+    policy.reset(3, 0)
+    world.step(policy.act(rows))
+    assert world.state.robot_message.tolist() == [[0.25, -0.5]] * 3
