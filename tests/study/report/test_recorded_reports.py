@@ -36,6 +36,12 @@ def outcome_of(policy: str, setting: Setting, seed: int) -> Outcome:
         delivery_times=times,
         ended_at=500.0,
         anchoring_seconds=float(rng.poisson(30.0)),
+        on_time=2 * n_delivered // 3,
+        share_on_time=0.6 if n_delivered else 0.0,
+        mean_tardiness=float(rng.poisson(20.0)),
+        p95_tardiness=float(rng.poisson(90.0)),
+        longest_queue=int(rng.poisson(7.0)),
+        turned_away=int(rng.poisson(1.0)),
         contacts_per_robot_minute=float(rng.poisson(50.0)),
         overlap_share=0.01 * float(rng.poisson(3.0)),
         digest=f"{policy} {setting} {seed}",
@@ -84,6 +90,6 @@ def test_reports_are_as_recorded(check_recorded: Check) -> None:
         text = re.sub(r"\b[0-9a-f]{12,}\b", "DIGEST", text)
         lines += [f"#### {name}", *(line for line in text.splitlines() if line)]
         for table, panel in report.runs.panels.items():
-            means = [f"{p.policy} {p.category} {p.value:.4g} {p.link}" for p in panel.points]
+            means = [f"{p.series} {p.category} {p.value:.4g} {p.link}" for p in panel.points]
             lines.append(f"panel {table}: {panel.x_label}: {'; '.join(means)}")
     check_recorded("reports.txt", lines)
