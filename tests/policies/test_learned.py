@@ -15,10 +15,11 @@ from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.policies import PolicyCard, charging, identity
 from swarm_logistics_env.policies.layers import hyperbolic_tangent
 from swarm_logistics_env.policies.learned import LearnedPolicy, tensor_shapes
-from swarm_logistics_env.policies.network_steps import explore
+from swarm_logistics_env.policies.network_steps import choose_outputs, explore
 from swarm_logistics_env.policies.policy import start
 from swarm_logistics_env.policies.row_policy import refuse_messages
 from swarm_logistics_env.world.motion import INPUTS
+from swarm_logistics_env.world.motion.classes import N_CLASSES, classes_of
 from swarm_logistics_env.world.motion.voices import MESSAGES
 from swarm_logistics_env.world.observations import N_COLUMNS, TURN_RATE
 from swarm_logistics_env.world.warehouse import Warehouse
@@ -126,6 +127,18 @@ def test_noise_is_of_each_robot_and_output_alone_and_of_its_deviation() -> None:
     explore(row_keys(0, "noise", 400), np.full(400, 7), deviations, later)
     np.testing.assert_allclose(noise.std(axis=0), deviations, rtol=0.15)
     assert np.abs(np.corrcoef(noise.T, later.T) - np.eye(6)).max() < 0.2
+
+
+def test_each_group_of_classes_is_drawn_for_itself_and_anew_at_each_decision() -> None:
+    keys = row_keys(0, "noise", 400)
+    logits = np.zeros((400, N_CLASSES), np.float32)
+    first, second = np.zeros((2, 400, 3), np.float32)
+    choose_outputs(keys, np.full(400, 6), 1.0, logits, first)
+    choose_outputs(keys, np.full(400, 7), 1.0, logits, second)
+    classes = np.hstack([classes_of(first), classes_of(second)]).astype(float)
+    moving = (classes[:, 1] > 0) & (classes[:, 4] > 0)  # who stands has no direction
+    correlations = np.corrcoef(classes[moving].T)
+    assert np.abs(correlations - np.eye(6)).max() < 0.25
 
 
 def test_identity_follows_weights_and_network_alone(card: PolicyCard, tensors: Tensors) -> None:

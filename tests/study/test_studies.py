@@ -308,3 +308,10 @@ def test_the_same_outcomes_are_looked_at_once(monkeypatch: pytest.MonkeyPatch) -
 def test_it_says_where_its_runs_are(tmp_path: Path) -> None:
     assert repr(Study(name="mine", seeds=2)) == "Study('mine', in memory)"
     assert repr(Study(name="mine", seeds=2, out=tmp_path)) == f"Study('mine', in {tmp_path})"
+
+
+def test_what_was_never_run_has_no_results_and_makes_no_store(tmp_path: Path) -> None:
+    study = Study(seeds=2, out=tmp_path)
+    with pytest.raises(StudyError, match="no study in"):
+        study.results()
+    assert not any(tmp_path.iterdir())
