@@ -1,7 +1,8 @@
 """Faults drawn over the whole package, and the share of them that the gate does not catch.
 
 Near tests are asked: those that run the line, where a record says which do, and those of near
-files. Then the type checker runs; the share without it is printed, too.
+files; then those that compare with a recorded file. Then the type checker runs; the share without
+it is printed, too.
 """
 
 from __future__ import annotations
@@ -31,10 +32,10 @@ from .reached import Reached
 
 SECONDS_OF_REACHING = 40.0  # of the tests that run a line; the nearest follow
 LONGEST = 900.0  # [s] of the clock after which the tests of a fault are stopped
-# What worlds and policies do, to the bit: asked of faults in them that no nearer test catches.
+# What worlds and policies do, to the bit: asked of faults in them that no other test catches.
 _TRAJECTORIES = "tests/verification/test_trajectories.py"
-# What forms of the environment, views, trainings and commands give, as files hold it: likewise.
-_RECORDED = "test_recorded_*.py"
+# What every room gives, as files hold it: asked of faults that no nearer test catches.
+_RECORDED = "test_recorded*.py"
 # Nodes of ROS 2, which the gate has not: `make ros` tests them.
 _NOT_IN_GATE = ("robots/ros_robot.py", "robots/ros_world.py")
 _COMPILER = ("numba", "llvmlite")  # who imports these changes how kernels are compiled
@@ -258,16 +259,15 @@ def _share(count: int, total: int) -> str:
 
 def _caught_by(fault: Fault, copy: Path) -> str:
     test = _caught_by_nearest(fault, copy)
-    if test or not fault.is_played:
+    if test:
         return test
+    tests = [str(path.relative_to(copy)) for path in sorted((copy / "tests").rglob(_RECORDED))]
+    if fault.is_played:
+        tests.append(_TRAJECTORIES)
     # Kernels are compiled, as the interpreter would take minutes.
     anew = fault.interpreted or fault.compiles_anew
-    tests = [_TRAJECTORIES]
-    if fault.interpreted:  # which tests run a kernel is in no record
-        paths = sorted((copy / "tests").rglob(_RECORDED))
-        tests += [str(path.relative_to(copy)) for path in paths]
-    played = fault._replace(tests=tuple(tests), interpreted=False, compiles_anew=anew)
-    return _caught_by_nearest(played, copy)
+    wide = fault._replace(tests=tuple(tests), interpreted=False, compiles_anew=anew)
+    return _caught_by_nearest(wide, copy) if tests else ""
 
 
 def _refused_by_types(fault: Fault, copy: Path) -> str:
