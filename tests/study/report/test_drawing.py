@@ -104,6 +104,8 @@ def drawn_scale(values: list[float], thresholds: tuple[float, ...]) -> str:
     (axes,) = canvas.axes
     low, high = axes.get_ylim()
     assert low <= min(values) <= max(values) < high
+    transform = axes.yaxis.get_transform()
+    assert getattr(transform, "linthresh", 1.0) == 1.0  # between -1 and 1 it is linear
     return axes.get_yscale()
 
 

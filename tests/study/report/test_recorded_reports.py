@@ -89,6 +89,7 @@ def test_reports_are_as_recorded(check_recorded: Check) -> None:
             text += f"\n{latex_tables(report.paper)}"
         text = re.sub(r"\b[0-9a-f]{12,}\b", "DIGEST", text)
         lines += [f"#### {name}", *(line for line in text.splitlines() if line)]
+        lines.append(report.runs.note)
         for table, panel in report.runs.panels.items():
             means = [f"{p.series} {p.category} {p.value:.4g} {p.link}" for p in panel.points]
             lines.append(f"panel {table}: {panel.x_label}: {'; '.join(means)}")

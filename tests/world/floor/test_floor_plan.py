@@ -109,6 +109,12 @@ def test_what_does_not_fit_into_the_cells_is_refused(
         planned(rows, **fields)
 
 
+def test_the_area_of_a_plan_is_that_of_its_storage_cells() -> None:
+    plan = planned("A::.\nB:::\nBB::").plan
+    assert plan is not None
+    assert plan.storage_area == pytest.approx(7 * 0.25)
+
+
 def test_a_plan_makes_a_delivery_strip_with_the_area_of_its_docks() -> None:
     assert planned("A::.\nB:::\nBB::").delivery_width == pytest.approx(4 * 0.5 / 3)
 

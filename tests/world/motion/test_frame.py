@@ -11,6 +11,7 @@ from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.frame import MotionView, command_own_frames
 from swarm_logistics_env.world.motion.memory import (
     MEMORY,
+    SURELY_IN_VAIN,
     body_of,
 )
 from swarm_logistics_env.world.motion.network_inputs import INPUTS, LEAD
@@ -218,3 +219,15 @@ def test_between_decisions_outputs_keep_their_direction_in_the_room(turn: float)
     held = complex(*frame.command(outputs)[0, :2])
     assert held == pytest.approx(decided * np.exp(-1j * turn))
     assert frame.counts.tolist() == [2]
+
+
+def test_a_network_is_told_that_it_delivers_in_vain_up_to_surely() -> None:
+    frame = frame_of(3)
+    longest = frame.memory[:, MEMORY.handling_time] + SURELY_IN_VAIN
+    rows = amid(carries="requested").repeat(3, axis=0)
+    rows[:, row.IN_DELIVERY_AREA] = 1.0
+    frame.memory[:, MEMORY.delivering] = np.array([0.0, 0.5, 3.0]) * longest
+    vain = frame.read(rows)[:, INPUTS.index("delivering_in_vain")]
+    assert vain[0] == pytest.approx(0.0, abs=0.15)  # it has begun
+    assert vain[1] == pytest.approx(0.5, abs=0.15)
+    assert vain[2] == 1.0
