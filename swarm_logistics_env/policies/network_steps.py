@@ -128,18 +128,18 @@ def decide(
     inputs = np.empty((rows.shape[0], layers.widths[0]), np.float32)
     read_observations(rows, period, memories, keys, counts, listens, inputs, turned)
     counts += 1
-    said = np.empty((rows.shape[0], layers.widths[-1]), np.float32)
-    run_network(inputs, layers, said)
+    answers = np.empty((rows.shape[0], layers.widths[-1]), np.float32)
+    run_network(inputs, layers, answers)
     if layers.widths[-1] >= N_CLASSES:
-        choose_outputs(keys, counts, np.float64(noise[0]), said, outputs)
+        choose_outputs(keys, counts, np.float64(noise[0]), answers, outputs)
     else:
         for robot in range(rows.shape[0]):
             for output in range(N_OUTPUTS):
-                outputs[robot, output] = said[robot, output]
+                outputs[robot, output] = answers[robot, output]
         if noise.any():
             explore(keys, counts, noise, outputs)
     if outputs.shape[1] > N_OUTPUTS:
-        speak(said, N_OUTPUTS, outputs)
+        speak(answers, N_OUTPUTS, outputs)
 
 
 @kernel

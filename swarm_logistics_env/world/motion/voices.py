@@ -51,15 +51,15 @@ def read_voices(
 
 
 @kernel
-def speak(said: NDArray[np.float32], first: int, spoken: NDArray[np.float32]) -> None:
-    """Fill messages, from column `first` of `spoken` on, with the last numbers of `said`.
+def speak(answers: NDArray[np.float32], first: int, outputs: NDArray[np.float32]) -> None:
+    """Fill messages, from column `first` of `outputs` on, with the last numbers of `answers`.
 
     Args:
-        said: (N, k) of a network's last layer.
-        spoken: (N, first + N_MESSAGES).
+        answers: (N, k) of a network's last layer.
+        outputs: (N, first + N_MESSAGES).
     """
-    n_before = said.shape[1] - N_MESSAGES
-    for robot in range(said.shape[0]):
+    n_before = answers.shape[1] - N_MESSAGES
+    for robot in range(answers.shape[0]):
         for message in range(N_MESSAGES):
-            number = said[robot, n_before + message]
-            spoken[robot, first + message] = min(max(number, np.float32(0.0)), np.float32(1.0))
+            number = answers[robot, n_before + message]
+            outputs[robot, first + message] = min(max(number, np.float32(0.0)), np.float32(1.0))

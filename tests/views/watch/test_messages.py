@@ -1,0 +1,63 @@
+"""Recordings: what a page replays of a session."""
+
+from __future__ import annotations
+
+import base64
+import itertools
+import json
+import re
+import zlib
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Scenario
+from swarm_logistics_env.views.watch import Session, messages
+from swarm_logistics_env.views.watch.messages import Recording, frame_message
+
+SMALL = Scenario(n_robots=8, n_items=10, duration=20.0, warehouse_width=5, warehouse_height=5)
+
+
+def test_a_recording_begins_anew_with_each_episode() -> None:
+    session = Session(SMALL)
+    recording = Recording(session)
+    for _ in range(2):
+        recording.note()
+        for _ in range(20):
+            session.advance()
+            recording.note()
+        session.next_seed()
+    recording.note()
+    (packed,) = re.findall(r'id="recording">([^<]+)<', recording.page())
+    first, *later_frames = json.loads(zlib.decompress(base64.b64decode(packed)))["past"]
+    assert (first["seed"], first["time"], later_frames) == (2, 0.0, [])
+
+
+def frames_of(recording: Recording) -> list[dict[str, Any]]:
+    """Return the frames that a page makes of a recording."""
+    frames: list[dict[str, Any]] = [{}]
+    frames += itertools.accumulate(json.loads(recording.text())["past"], dict.__or__)
+    return frames[1:]
+
+
+def test_a_long_recording_is_bounded_and_its_frames_stay_right(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    session = Session(SMALL.replace(duration=60.0), "homing", faults=["FM4:2@7"])
+    recording = Recording(session)
+    poses = {}
+    monkeypatch.setattr(messages, "MOST_POSES", 8 * 40)
+    while not session.is_over:
+        poses[round(session.state.time, 3)] = frame_message(session)["poses0"]
+        recording.note()
+        session.advance()
+    recording.note()
+    frames = frames_of(recording)
+    times = [frame["time"] for frame in frames]
+    assert len(frames) <= 40
+    assert (times[0], times[-1]) == (0.0, session.state.time)
+    assert max(np.diff(times)) <= 2.0
+    assert [frame["poses0"] for frame in frames[:-1]] == [poses[time] for time in times[:-1]]
+    failed = [sum(robot[2] == "4" for robot in frame["robots0"]) for frame in frames]
+    assert failed == [2 if time >= 7.0 else 0 for time in times]
