@@ -244,7 +244,9 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     @property
     def true_messages(self) -> NDArray[np.float32]:
         """What the network should tell (num_envs, N_MESSAGES); (num_envs, 0): it does not talk."""
-        return messages_of(self._privileged)[:, : self._n_messages]
+        if not self._n_messages:  # each step of any training comes by here
+            return np.zeros((self.num_envs, 0), np.float32)
+        return messages_of(self._privileged)
 
     @property
     def labels(self) -> NDArray[np.float32]:

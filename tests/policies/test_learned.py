@@ -222,10 +222,10 @@ def test_a_network_that_talks_tells_its_neighbours_two_numbers_and_hears_them(
     assert ((commands[:, 4:] >= 0.0) & (commands[:, 4:] <= 1.0)).all()
     rows = warehouse.step(commands)
     np.testing.assert_allclose(warehouse.state.robot_message, commands[:, 4:])
-    other = copy.deepcopy(talking)
-    again = talking.act(rows)
-    np.testing.assert_array_equal(again[:, 4:], commands[:, 4:])  # between two decisions
-    np.testing.assert_array_equal(other.act(rows), again)
+    duplicate = copy.deepcopy(talking)
+    next_commands = talking.act(rows)
+    np.testing.assert_array_equal(next_commands[:, 4:], commands[:, 4:])  # between two decisions
+    np.testing.assert_array_equal(duplicate.act(rows), next_commands)
     with pytest.raises(PolicyError, match="of 141 columns: should be at least 157"):
         talking.act(rows[:, :N_COLUMNS])
     assert talking.memories()["output_dock_nearness"].tolist() == commands[:, 5].tolist()

@@ -127,11 +127,11 @@ def test_every_role_is_searched_at_every_time_at_which_robots_may_have_it() -> N
 
 def test_faults_are_the_more_alike_the_more_they_share() -> None:
     fault = Fault("FM1", 1, onset=0.0, role="carrier")
-    others = [
+    neighbours = [
         fault.replace(onset=9.0), fault.replace(role="searching"),
         fault.replace(role="searching", onset=9.0), Fault("FM2", 1, onset=0.0, role="carrier"),
     ]  # fmt: skip
-    alike = _covariance([fault, *others])
+    alike = _covariance([fault, *neighbours])
     assert np.diag(alike).tolist() == pytest.approx([1.0] * 5)
     np.testing.assert_array_equal(alike, alike.T)
     at_another_time, in_another_role, in_both, of_another_mode = alike[0, 1:]

@@ -193,18 +193,18 @@ def test_the_urgent_order_comes_first_and_one_that_is_open_stays(build: Build) -
 def test_what_a_class_took_and_comes_back_no_more_is_not_ordered_by_its_number() -> None:
     orders = file_of("0,A,", "0.3,0,", "0.3,1,", header="time,item,dock")
     scenario = Scenario(n_robots=1, n_items=3, orders=orders, restock=True)
-    seen = set()
+    drawn_items = set()
     for seed in range(8):
         world = Warehouse(scenario)
         world.reset(seed)
-        taken = requested_items(world)
+        first_items = requested_items(world)
         world.change(restock=False)
         steps(world, STAY, times=4)
-        assert requested_items(world) == taken
-        assert waiting_items(world) == [item for item in (0, 1) if item not in taken]
-        assert world.state.order_measures.turned_away == int(taken != [2])
-        seen.update(taken)
-    assert seen == {0, 1, 2}
+        assert requested_items(world) == first_items
+        assert waiting_items(world) == [item for item in (0, 1) if item not in first_items]
+        assert world.state.order_measures.turned_away == int(first_items != [2])
+        drawn_items.update(first_items)
+    assert drawn_items == {0, 1, 2}
 
 
 def test_of_fewer_orders_than_requests_at_a_time_each_is_put_back_once_a_time_out(
