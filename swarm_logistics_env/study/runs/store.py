@@ -277,9 +277,16 @@ class Runs:
     @contextmanager
     def _transaction(self) -> Iterator[None]:
         """Keep all that the block writes or, if it fails, nothing of it."""
-        with self._writing, self._explained(), self._connection:
+        with self._writing, self._explained():
             self._execute("BEGIN IMMEDIATE")
-            yield
+            try:
+                yield
+                self._connection.commit()
+            except BaseException:
+                # After a Ctrl-C before the block's first line the store may be closed already.
+                with suppress(sqlite3.ProgrammingError):
+                    self._connection.rollback()
+                raise
 
     @contextmanager
     def _explained(self) -> Iterator[None]:

@@ -237,6 +237,17 @@ for line in sys.stdin:
 
 
 @pytest.mark.daily
+def test_a_ctrl_c_at_the_start_of_a_transaction_lets_the_store_close(tmp_path: Path) -> None:
+    """Where it comes before the block's first line, Python ends the transaction after the store."""
+    runs = Runs(tmp_path / FILE_NAME)
+    begun = runs._transaction()
+    begun.__enter__()
+    runs.close()
+    del begun  # an error in it would be printed, which fails every test here
+    with Runs(tmp_path / FILE_NAME) as reopened:
+        reopened.note("name", "written")
+
+
 def test_two_processes_may_make_the_store_at_once(tmp_path: Path) -> None:
     pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
     makers = [subprocess.Popen([sys.executable, "-c", MAKER, name], **pipes) for name in "01"]
