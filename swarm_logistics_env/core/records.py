@@ -182,7 +182,12 @@ class Record(BaseModel):
 
     @classmethod
     def _sentence(cls, error: ValidationError) -> str:
-        return "; ".join(dict.fromkeys(cls._problem(dict(problem)) for problem in error.errors()))
+        # A value that may be of several kinds has a problem for each: "should be .., or be ..".
+        wishes: dict[str, list[str]] = {}
+        for sentence in dict.fromkeys(cls._problem(dict(problem)) for problem in error.errors()):
+            subject, separator, wish = sentence.partition(": should ")
+            wishes.setdefault(subject + separator, []).append(wish)
+        return "; ".join(subject + ", or ".join(texts) for subject, texts in wishes.items())
 
     @classmethod
     def _problem(cls, problem: dict[str, Any]) -> str:

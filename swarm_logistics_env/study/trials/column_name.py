@@ -17,8 +17,8 @@ class ColumnName(str):
 
     @property
     def bare(self) -> str:
-        """In small letters, without accents and unit: "Time [s]" is "time"."""
-        without_brackets = re.sub(r"\s*[\[(].*?[\])]\s*", " ", self)
+        """In small letters, without accents and unit: "Time [s]" is "time", "P in %" is "p"."""
+        without_brackets = re.sub(r"\s*[\[(].*?[\])]\s*|\s+in\s+%$", " ", self)
         return re.sub(r"\W+", "_", plain(without_brackets)).strip("_")
 
     @property

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from shlex import quote
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
@@ -117,14 +118,21 @@ def trial_of(
     duration: float | None,
 ) -> Trial:
     """Return the trial of a row, of an event log without its times; arguments as of `trials_of`."""
+    if row.text("duration"):
+        in_row = row.number("duration", 0.0)
+        if duration not in (None, in_row):
+            raise row.error(
+                "duration",
+                f"should be the {duration:g} s of --duration; leave out either the option, or the "
+                f"column by --ignore {quote(row.columns.by_meaning['duration'].name)}",
+            )
+        duration = in_row
     performance, least = performance_of(row, finished, duration)
     n_robots = row.whole_or_none("n_robots", 1)
     fault = faults[row.text("fault")]
     faulty = row.whole_or_none("faulty", 0) or 0
     is_fault = fault not in (NO_FAULT_WORD, REPEATED)
     onset = row.number_or_none("onset") or 0.0
-    if row.text("duration"):
-        duration = row.number("duration", 0.0)
     if is_fault and not faulty:
         raise row.error("faulty", f"should be how many robots fail by {fault!r}, 1 or more")
     if faulty and not is_fault:

@@ -152,6 +152,12 @@ def _melted(table: Table, conditions: Mapping[int, Condition], columns: Mapping[
     if len(sizes) == 1:  # "none" beside "wheel 1 of 8"
         conditions = {n: {**condition, "robots": min(sizes)} for n, condition in conditions.items()}
     units = {match[0] for n in conditions if (match := _UNIT.search(table.header[n]))}
+    in_brackets = sorted({unit.strip() for unit in units if "[" in unit})
+    if len(in_brackets) > 1:
+        raise IndicatorError(
+            f"{table.source}: columns of conditions have the units {' and '.join(in_brackets)}: "
+            "should have one unit"
+        )
     measured = CELLS + (units.pop().rstrip() if len(units) == 1 else "")
     new = [*dict.fromkeys(name for condition in conditions.values() for name in condition)]
     for name in (*new, measured):
