@@ -17,7 +17,7 @@ import pytest
 from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.robots.c_program import Program
 from swarm_logistics_env.robots.c_sizes import WARNINGS
-from swarm_logistics_env.robots.c_values import FLOAT, INT, ArrayOf, Known, Value
+from swarm_logistics_env.robots.c_values import DOUBLE, FLOAT, INT, ArrayOf, Known, Value
 
 TABLE = np.array([0.5, -1.5, 2.5, 4.0])
 _STEP = 0.25
@@ -95,6 +95,10 @@ def exchanging_items(x: float, n: int) -> float:
     return x + n
 
 
+def stepping(numbers: Any, n: int) -> None:
+    numbers[n] = math.sqrt(numbers[0] * _STEP) + (1.5 if n else numbers[1])
+
+
 def failing(x: float, n: int) -> float:
     assert n > 0
     return x
@@ -163,3 +167,14 @@ def test_what_is_fixed_is_no_argument_and_what_is_only_read_is_constant() -> Non
     assert "static void change(float *numbers, const float *others) {" in program.text()
     assert "#define PERIOD REAL(0.1)" in program.text()
     assert program.function(change, arguments) is function
+
+
+def test_c_is_as_recorded(check_recorded: Any) -> None:
+    """Of the functions above, and of one that is exact."""
+    inexact, exact = Program(), Program(exact=(stepping,))
+    for function in (whole_numbers, rest, choices, tuples, arrays):
+        inexact.function(function, [Value("x", FLOAT), Value("n", INT)])
+    for program, kind in ((inexact, FLOAT), (exact, DOUBLE)):
+        program.function(stepping, [Value("numbers", ArrayOf(kind, (4,))), Value("n", INT)])
+    lines = [*inexact.text().splitlines(), "", "/* exact */", *exact.text().splitlines()]
+    check_recorded("functions.c", lines)
