@@ -262,12 +262,14 @@ def _caught_by(fault: Fault, copy: Path) -> str:
     if test:
         return test
     tests = [str(path.relative_to(copy)) for path in sorted((copy / "tests").rglob(_RECORDED))]
-    if fault.is_played:
-        tests.append(_TRAJECTORIES)
-    # Kernels are compiled, as the interpreter would take minutes.
-    anew = fault.interpreted or fault.compiles_anew
-    wide = fault._replace(tests=tuple(tests), interpreted=False, compiles_anew=anew)
-    return _caught_by_nearest(wide, copy) if tests else ""
+    # Each has time of its own, as kernels may be compiled anew for most of it.
+    for further in (tests, [_TRAJECTORIES] if fault.is_played else []):
+        # Kernels are compiled, as the interpreter would take minutes.
+        anew = fault.interpreted or fault.compiles_anew
+        wide = fault._replace(tests=tuple(further), interpreted=False, compiles_anew=anew)
+        if further and (test := _caught_by_nearest(wide, copy)):
+            return test
+    return ""
 
 
 def _refused_by_types(fault: Fault, copy: Path) -> str:
