@@ -7,7 +7,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from swarm_logistics_env import FAILURE_MODES, Scenario, policies
+from swarm_logistics_env.policies.homing import HomingParameters
+from swarm_logistics_env.policies.homing_stock import HomingStockParameters
 from swarm_logistics_env.policies.policy import ScriptParameters
+from swarm_logistics_env.policies.swarm_dt import SwarmDTParameters
 from swarm_logistics_env.study.questions.benchmark_cells import drawn_cells
 from swarm_logistics_env.study.questions.specification import Specification
 from swarm_logistics_env.study.tasks.performance import MEASURES
@@ -36,6 +39,9 @@ def settings() -> Iterator[tuple[str, object]]:
         parameters = getattr(policies.load(name), "parameters", None)
         if isinstance(parameters, ScriptParameters):
             yield f"policy {name}", parameters.model_dump(mode="json")
+    for kind in (HomingParameters, HomingStockParameters, SwarmDTParameters):
+        yield f"{kind.__name__}, small robots", {**kind.of_small_robots}
+        yield f"{kind.__name__}, fast robots", {**kind.of_fast_robots}
     yield "study", Specification().model_dump(mode="json")
     for name, mode in FAILURE_MODES.items():
         yield f"failure mode {name}", repr(mode)

@@ -44,8 +44,8 @@ class PolicySpec(Record):
     name: str
     parameters: dict[str, JsonValue] = Field(default_factory=dict)
     label: str = ""
-    made: Any = Field(default=None, exclude=True, repr=False)
-    trusted: bool = Field(default=False, exclude=True, repr=False)
+    made: Any = Field(default=None, repr=False)
+    trusted: bool = Field(default=False, repr=False)
 
     @classmethod
     def of(cls, value: object) -> Self:

@@ -70,6 +70,16 @@ def test_a_dead_robot_stands_and_sends_nothing() -> None:
     assert layer.broadcast(3.0, [], 10.0) is None
 
 
+def test_who_hears_no_requests_knows_of_none_that_it_sees_or_carries() -> None:
+    layer = layer_of("FM3_isolated:1@10")
+    sensed = np.full(row.N_COLUMNS, 0.1, np.float32)
+    items = range(row.ITEMS, row.NEIGHBOURS, row.ITEM_WIDTH)
+    sensed[items] = 1.0  # present
+    requested = [row.CARRYING_REQUESTED, *(item + row.ITEM.requested for item in items)]
+    assert layer.sensed(sensed, 9.9)[requested].all()
+    assert not layer.sensed(sensed, 10.0)[requested].any()
+
+
 def test_a_robot_that_is_away_senses_and_does_nothing_until_it_is_back() -> None:
     layer = layer_of("away:1@10+5")
     sensed = np.ones(row.N_COLUMNS)

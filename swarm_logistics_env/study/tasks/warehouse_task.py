@@ -258,6 +258,9 @@ class RecordedFault(Record):
     onset: float = 0.0
 
 
+_NOT_AGAIN = "recorded trials cannot be played again: give a file with more of them"
+
+
 class RecordedTrials:
     """Trials of real robots, another simulator or a paper; see `Task` for the attributes."""
 
@@ -281,8 +284,8 @@ class RecordedTrials:
     def fault(
         self, mode: str, robots: int, onset: float, duration: float | None, manner: Fields
     ) -> RecordedFault:
-        """Return the fault; how long it lasted is not recorded."""
-        return RecordedFault(mode=mode, robots=robots, onset=onset)
+        """Raise, as `play` does."""
+        raise StudyError(_NOT_AGAIN)
 
     def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
         """Raise: what was recorded cannot be played again.
@@ -290,7 +293,7 @@ class RecordedTrials:
         Raises:
             StudyError: always.
         """
-        raise StudyError("recorded trials cannot be played again: give a file with more of them")
+        raise StudyError(_NOT_AGAIN)
 
 
 WAREHOUSE = WarehouseTask()

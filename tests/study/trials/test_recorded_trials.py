@@ -45,6 +45,10 @@ TRIALS: dict[str, tuple[str, dict[str, Any]]] = {
     "percent in words": ("robots,P in %,width\n4,50,1\n8,75,2\n", {}),
     "percent of two kinds": ("robots,P [%],width\n4,50 %,1\n8,75%,2\n", {}),
     "units in the second row": ("robots,P,slope\n-,[boxes],[m/s]\n4,5,1\n8,9,1\n", {}),
+    "repetitions in the second row": (
+        "policy,N=4,,N=8,\nname,run 1,run 2,run 1,run 2\na,5,6,9,8\nb,3,4,5,7\n",
+        {},
+    ),
     "a sum below": ("robots,P,seed\n4,5,1\n4,7,2\nSumme,12,\n", {}),
     "a note below": ("robots,P,seed\n4,5,1\n4,7,2\nrained on Tuesday,,\n", {}),
     "a column of notes": ("robots,P,remark\n4,5,fine\n4,7,\n8,9,cold\n", {}),

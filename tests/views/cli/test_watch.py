@@ -13,6 +13,7 @@ import webbrowser
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from swarm_logistics_env.compiler.numba_fence import QUIET
@@ -45,7 +46,11 @@ def test_film_is_written(
     assert re.fullmatch(rf"{film.name}: \d+ frames, [\d.]+ s, [\d.]+ MB\n", printed)
     assert film.stat().st_size > 1000
     assert plans == ([True] if film.suffix == ".gif" else [])  # a floor plan takes further colours
-    assert film.read_bytes()[:8].endswith(b"ftyp") == (film.suffix == ".mp4")
+    content = film.read_bytes()
+    assert content[:8].endswith(b"ftyp") == (film.suffix == ".mp4")
+    if film.suffix == ".gif":
+        width, height = np.frombuffer(content, "<u2", count=2, offset=6)
+        assert width > 1.5 * height  # two runs side by side
 
 
 SCRIPT = """

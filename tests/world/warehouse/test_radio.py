@@ -79,6 +79,17 @@ def test_who_is_seen_and_not_heard_tells_neither_its_timer_nor_a_message(build: 
     assert rows[2, row.MESSAGES : row.MESSAGES + 2].tolist() == [0.5, 0.5]
 
 
+@pytest.mark.parametrize("loss", [0.0, 0.01])
+def test_who_is_silent_is_not_heard_though_messages_get_lost(loss: float, build: Build) -> None:
+    faults = [Fault("FM3_isolated", (0,))]
+    fields: dict[str, Any] = {"radio_loss": loss, "message_size": 1}
+    world = build([(8.5, 5.0), (7.8, 5.0), (7.1, 5.0)], [FAR], faults, **fields)
+    for _ in range(10):
+        rows = world.step([(0.0, 0.0, 0.0, 0.0, 0.5)] * 3)
+        assert not rows[0, row.MESSAGES : row.MESSAGES + 2].any()
+        assert not rows[1, row.MESSAGES + 1]
+
+
 def test_a_liar_whose_radio_is_late_as_well_tells_zero_at_once(build: Build) -> None:
     faults = [Fault("FM1", (0,)), Fault("radio_delayed", (0,))]
     world = build([(8.1, 5.0), (7.0, 5.0)], [FAR], faults)

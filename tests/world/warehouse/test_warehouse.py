@@ -45,6 +45,7 @@ def test_what_needs_an_episode_is_refused_before_the_first_reset(
         (lambda world: world.reset(1, ["FM1:3"]), FaultError, "at most n_robots = 2"),
         (lambda world: world.reset(1, [Fault("FM1", (0, 2))]), FaultError, "numbered 0 to 1"),
         (lambda world: world.set_faults(None), FaultError, "faults = None"),
+        (lambda world: world.change(n_items=2), ScenarioError, "n_items cannot change during a"),
         (lambda world: world.step(np.zeros((3, 4))), CommandError, r"\(3, 4\): should be \(2, 4\)"),
         (lambda world: world.step([["1"] * 4] * 2), CommandError, "real ones, not <U1"),
         (lambda world: world.step([[0] * 4, [0] * 2]), CommandError, "numbers"),
