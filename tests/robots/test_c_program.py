@@ -104,6 +104,10 @@ def failing(x: float, n: int) -> float:
     return x
 
 
+def of_integers(x: float, n: int) -> float:
+    return x + min(n, 2)
+
+
 def as_c(function: Callable[..., Any], folder: Path) -> Any:
     """Return the function compiled, of a float and an integer."""
     program = Program()
@@ -143,6 +147,7 @@ def test_c_computes_what_python_computes(function: Callable[..., Any], tmp_path:
             r"test_c_program.exchanging: no C for `.*x, y.* = .*y, x \+ 1.0.*`: an exchange",
         ),
         (exchanging_items, r"no C for `pair\[0\], .*: an exchange"),
+        (of_integers, r"no C for `return x \+ min\(n, 2\)`: min of integers"),
         (failing, "no C for `assert n > 0`: Assert"),
         (math.sqrt, "sqrt is no function of Python's"),
     ],
@@ -150,6 +155,17 @@ def test_c_computes_what_python_computes(function: Callable[..., Any], tmp_path:
 def test_what_has_no_c_is_told_with_its_line(function: Callable[..., Any], message: str) -> None:
     with pytest.raises(PolicyError, match=message):
         Program().function(function, [Value("x", FLOAT), Value("n", INT)])
+
+
+def test_rows_of_which_there_are_several_have_no_c() -> None:
+    def first_of(numbers: Any, n: int) -> float:
+        first: float = numbers[n, 0]
+        return first
+
+    for count in (1, 2):
+        rows = Value("numbers", ArrayOf(FLOAT, (count, 3)))
+        with pytest.raises(PolicyError, match="numbers: more rows than one"):
+            Program().function(first_of, [rows, Value("n", INT)])
 
 
 def test_what_is_fixed_is_no_argument_and_what_is_only_read_is_constant() -> None:
