@@ -18,9 +18,19 @@ from functools import partial
 from itertools import combinations, pairwise, product
 
 from more_itertools import map_reduce
-from scipy.stats import binomtest, ttest_ind
+from scipy.stats import binomtest
 
-from research.tables import ROOT, block_rows, curve_of, play, rewrite, seeds_from, side, table
+from research.tables import (
+    ROOT,
+    block_rows,
+    curve_of,
+    difference_of_means,
+    play,
+    rewrite,
+    seeds_from,
+    side,
+    table,
+)
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.study import Study
@@ -143,8 +153,7 @@ def samples(cell: Cell) -> Numbers:
 def difference(cells: Mapping[tuple[str, int], Cell], pair: Sequence[str], n: int) -> spi.Interval:
     """Return P of the first policy less that of the second, with its 95 % interval."""
     first, second = (samples(cells[policy, n]) for policy in pair)
-    low, high = ttest_ind(first, second, equal_var=False).confidence_interval(0.95)
-    return spi.Interval(float(first.mean() - second.mean()), float(low), float(high))
+    return difference_of_means(first, second)
 
 
 def turns_block(results: Results) -> str:

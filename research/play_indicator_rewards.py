@@ -22,9 +22,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from research.tables import ROOT, rewrite, table
+from research.tables import ROOT, difference_of_means, rewrite, table
 from swarm_logistics_env import Fault, policies, run_episode, spi
-from swarm_logistics_env.spi import Interval
+from swarm_logistics_env.spi.summaries import interval_of_mean
 from swarm_logistics_env.study.report import section
 from swarm_logistics_env.study.runs.engines import usable_cores
 from swarm_logistics_env.train import Training, load_training
@@ -80,28 +80,14 @@ def measure(weight: float, seed: int) -> Measured:
     return Measured(float(np.mean(p)), float(np.mean(p_broken)), r)
 
 
-def mean(values: NDArray[np.float64]) -> Interval:
-    """Return the mean over trainings with Student's interval of 95 %."""
-    from scipy.stats import ttest_1samp
-
-    limits = ttest_1samp(values, 0.0).confidence_interval(0.95)
-    return Interval(float(values.mean()), float(limits.low), float(limits.high))
-
-
-def difference(new: NDArray[np.float64], old: NDArray[np.float64]) -> Interval:
-    """Return the difference of two means over trainings, with Welch's interval of 95 %."""
-    from scipy.stats import ttest_ind
-
-    limits = ttest_ind(new, old, equal_var=False).confidence_interval(0.95)
-    return Interval(float(new.mean() - old.mean()), float(limits.low), float(limits.high))
-
-
 def rows_of(columns: dict[float, NDArray[np.float64]]) -> Iterator[tuple[str, ...]]:
     """Yield a row of each weight; columns are (trainings, 3), as in `Measured`."""
     without = columns[0.0]
     for weight, measured in columns.items():
-        means = [mean(measured[:, column]) for column in range(3)]
-        changes = [difference(measured[:, column], without[:, column]) for column in (0, 2)]
+        means = [interval_of_mean(measured[:, column]) for column in range(3)]
+        changes = [
+            difference_of_means(measured[:, column], without[:, column]) for column in (0, 2)
+        ]
         changed = [section.bracketed(change, digits) for change, digits in zip(changes, (1, 2))]
         yield (
             "without R" if weight == 0.0 else f"R, weight {weight:g}",
