@@ -108,6 +108,11 @@ def of_integers(x: float, n: int) -> float:
     return x + min(n, 2)
 
 
+def of_any_length(x: float, n: int) -> float:
+    numbers = np.empty(4, np.float32)
+    return float(numbers[0:n].max())
+
+
 def as_c(function: Callable[..., Any], folder: Path) -> Any:
     """Return the function compiled, of a float and an integer."""
     program = Program()
@@ -148,6 +153,7 @@ def test_c_computes_what_python_computes(function: Callable[..., Any], tmp_path:
         ),
         (exchanging_items, r"no C for `pair\[0\], .*: an exchange"),
         (of_integers, r"no C for `return x \+ min\(n, 2\)`: min of integers"),
+        (of_any_length, r"no C for `return .*`: numbers\[0:n\]$"),
         (failing, "no C for `assert n > 0`: Assert"),
         (math.sqrt, "sqrt is no function of Python's"),
     ],

@@ -124,7 +124,7 @@ def test_a_robot_that_answers_without_a_pose_is_stopped_and_tries(watched: Watch
     assert watched.step() == 1.0
 
 
-@pytest.mark.parametrize("turn", [0.2, -0.2])
+@pytest.mark.parametrize("turn", [0.2, -0.2, np.radians(0.6)])
 def test_a_robot_that_turns_on_the_spot_to_either_side_is_not_taken_for_frozen(
     watched: Watched, turn: float
 ) -> None:

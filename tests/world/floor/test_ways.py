@@ -45,6 +45,16 @@ def test_a_way_beside_a_rack_is_that_of_its_cell() -> None:
     assert at_the_rack == middle
 
 
+def test_each_point_has_the_way_to_its_own_dock() -> None:
+    floor = world_of(floor="A::::B\n:::===\n::::::", request_docks="random").floor
+    points = [[1.25, 0.25], [1.25, 0.25], [2.75, 1.25], [0.75, 1.25]]
+    to_each = [floor.along(points, dock) for dock in (0, 1)]
+    assert floor.along(points, [0, 1, 1, 0]).tolist() == [
+        to_each[dock][number] for number, dock in enumerate((0, 1, 1, 0))
+    ]
+    assert to_each[0][0] > to_each[1][0]  # the way to B is the longer one
+
+
 @pytest.mark.parametrize(
     ("floor", "axis"),
     [("::::AAAA\n" * 3, 0), ("AAAA::::\n" * 3, 0), (":::\n" * 4 + "AAA\n" * 4, 1),
