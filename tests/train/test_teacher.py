@@ -119,3 +119,30 @@ def test_the_network_comes_to_say_what_the_teacher_says_and_the_critic_warms_up_
     shorter = training.replace(agent_steps=320)
     assert weights(train(shorter, tmp_path / "warm")) == imitated
     assert weights(train(training, tmp_path / "on")) != imitated
+
+
+def test_robots_do_what_the_network_says_where_the_teacher_has_no_share(small: Any) -> None:
+    teacher = {"policy": "homing", "decisions": 400, "shares": [0.0, 0.0], "noise": 0.0}
+    training = small(network=CLASSES, teacher=teacher)
+    learner = make_learner(NetworkView(training), CLASSES, training.ppo, training.seed, "cpu")
+    view = learner.env
+    read: list[Any] = [view.reset().copy()]  # by the networks, before each decision
+    driven: list[Any] = []
+    said: list[Any] = []
+
+    def give_outputs(outputs: Any) -> None:
+        with torch.no_grad():
+            answers = learner.policy.answers_of(torch.from_numpy(read[-1][:, : CLASSES.widths[0]]))
+            said.append(learner.policy.likeliest_outputs(answers))
+        driven.append(outputs.copy())
+        type(view).give_outputs(view, outputs)
+
+    def step_wait() -> Any:
+        stepped = type(view).step_wait(view)
+        read.append(stepped[0].copy())
+        return stepped
+
+    view.give_outputs, view.step_wait = give_outputs, step_wait
+    imitate(training, learner, TrainingLog(), generator(0, "imitation"))
+    assert len(driven) > 10
+    np.testing.assert_array_equal(driven[1:], said[1:])  # it begins new episodes
