@@ -83,6 +83,12 @@ def _preset(
     return GoldenTrajectory(scenario, steps=steps, policy=policy)
 
 
+# Orders for an item or for one of a class, at a dock or at any, due or not.
+_LISTED = (
+    "0,3,A,20,0", "0,tin,,30,1", "1,3,B,,0", "2,5,,25,2", "4,box,B,,0", "30,1,,,0", "90,tin,A,99,1"
+)  # fmt: skip
+
+
 GOLDEN = {
     "preset paper": _preset("paper", 100),
     "preset paper_scalability": _preset("paper_scalability", 50),
@@ -191,6 +197,32 @@ GOLDEN |= {
     "swarm-dt-tuned": _small(policy="swarm-dt-tuned", restock=True, steps=300),
     "ppo-delivery with wheels": _small(
         policy="ppo-delivery", drive="differential", n_obstacles=3, restock=True, steps=300
+    ),
+    "requests of few items, told late or never": _small(
+        demand="zipf", n_requests=3, request_delay=1.0, request_loss=0.2, restock=True, steps=300
+    ),
+    "requests that are drawn each for itself": _small(demand="independent", restock=True),
+    "a list of orders": GoldenTrajectory(
+        Scenario(
+            floor="A::::::B\n::::::::\n::::::::\n::::::::\n::::::::",
+            n_robots=4,
+            n_items=8,
+            orders="time,item,dock,due,priority/" + "/".join(_LISTED),
+            announced="urgent",
+            restock=True,
+        ),
+        policy="homing",
+        steps=650,
+    ),
+    "radios that are late with messages": _small(Fault("radio_delayed", 3, 2.0), message_size=2),
+    "more robots than stations that charge": _small(
+        battery=400.0,
+        n_stations=3,
+        dead_stations=2,
+        n_robots=16,
+        policy="homing+charging",
+        restock=True,
+        steps=650,
     ),
     "changes during the run": _small(
         delivery_width=0.5,
