@@ -6,21 +6,42 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from swarm_logistics_env import FAILURE_MODES, Scenario, policies
+from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, policies
+from swarm_logistics_env.policies.biased_walk import BiasedWalkParameters
+from swarm_logistics_env.policies.charging_robots import ChargingParameters
 from swarm_logistics_env.policies.homing import HomingParameters
 from swarm_logistics_env.policies.homing_stock import HomingStockParameters
+from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.policies.policy import ScriptParameters
+from swarm_logistics_env.policies.site_fidelity import SiteFidelityParameters
 from swarm_logistics_env.policies.swarm_dt import SwarmDTParameters
+from swarm_logistics_env.robots.middleware import Middleware
 from swarm_logistics_env.study.questions.benchmark_cells import drawn_cells
-from swarm_logistics_env.study.questions.specification import Specification
+from swarm_logistics_env.study.questions.specification import (
+    Ablation,
+    Faults,
+    Parameter,
+    Sizes,
+    Specification,
+)
 from swarm_logistics_env.study.tasks.performance import MEASURES
 from swarm_logistics_env.train import load_training, preset_names
+from swarm_logistics_env.train.settings import (
+    Conditions,
+    Evaluation,
+    Indicators,
+    PPOSettings,
+    Scores,
+    Teaching,
+    WorldKind,
+)
 from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.views.cli.app import command_line
 from swarm_logistics_env.views.cli.output import PROGRAM
 from swarm_logistics_env.world.rendering import palette
 from swarm_logistics_env.world.scenario import SCENARIO_PRESETS
 from swarm_logistics_env.world.scenario.order_file import ORDER_SHAPES
+from swarm_logistics_env.world.scenario.robot_kinds import RobotKind
 from tests.conftest import Check
 
 
@@ -53,6 +74,39 @@ def settings() -> Iterator[tuple[str, object]]:
     yield "dark colours", palette.DARK_COLOURS
 
 
+RECORDS = (
+    Scenario, RobotKind, Fault, Middleware, Network, Training, WorldKind, Conditions, Indicators,
+    PPOSettings, Teaching, Evaluation, Scores, Sizes, Faults, Parameter, Ablation,
+    BiasedWalkParameters, ChargingParameters, HomingParameters, HomingStockParameters,
+    SiteFidelityParameters, SwarmDTParameters,
+)  # fmt: skip
+# What limits a value, by JSON Schema's words.
+LIMITS = (
+    "minimum", "exclusiveMinimum", "maximum", "exclusiveMaximum", "minItems", "maxItems",
+    "minLength", "maxLength", "pattern", "enum", "const",
+)  # fmt: skip
+
+
+def limits_in(schema: object) -> Iterator[str]:
+    """Yield what limits values anywhere in a schema."""
+    if isinstance(schema, list):
+        for part in schema:
+            yield from limits_in(part)
+    if isinstance(schema, dict):
+        yield from (f"{word} {schema[word]!r}" for word in LIMITS if word in schema)
+        for name, part in schema.items():
+            if name not in LIMITS:
+                yield from limits_in(part)
+
+
+def limits_of_fields() -> Iterator[str]:
+    """Yield what the fields of records may be."""
+    for record in RECORDS:
+        for name, schema in record.model_json_schema()["properties"].items():
+            if limit := ", ".join(limits_in(schema)):
+                yield f"field {record.__name__}.{name}: {limit}"
+
+
 def options(command: Any, name: str) -> Iterator[str]:
     """Yield what each option of a command, and of those below it, usually is and may be."""
     for parameter in command.params:
@@ -68,5 +122,6 @@ def options(command: Any, name: str) -> Iterator[str]:
 
 def test_settings_are_as_recorded(check_recorded: Check) -> None:
     lines = [f"{name}: {json.dumps(value)}" for name, value in settings()]
+    lines += limits_of_fields()
     lines += options(command_line(), PROGRAM)
     check_recorded("settings.txt", lines)
