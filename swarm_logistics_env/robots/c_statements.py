@@ -217,6 +217,8 @@ class KernelWriter(Expressions):
                 return
             case _:
                 raise NoCError(f"a loop over {ast.unparse(statement.iter)}")
+        if len(numbers) > 2:
+            raise NoCError("a loop by steps")
         first, last = numbers if len(numbers) > 1 else [constant(0), *numbers]
         if (first.constant, last.constant) == (0, 1):
             self._variables[target.id] = constant(0)
@@ -335,8 +337,12 @@ class KernelWriter(Expressions):
         self._written.add(item.root)
         if isinstance(item.kind, ArrayOf):
             text = stored(value, item.kind.element).text
-            self._emit(f"for (int32_t n = 0; n < {item.kind.shape[0]}; n++) {{")
-            self._emit(f"{INDENT}{item.within(ATOM)}[n] = {text};")
+            index = "n"
+            while index in self._variables:  # which the value may use
+                index += "n"
+            length = item.kind.shape[0]
+            self._emit(f"for (int32_t {index} = 0; {index} < {length}; {index}++) {{")
+            self._emit(f"{INDENT}{item.within(ATOM)}[{index}] = {text};")
             self._emit("}")
             return
         self._emit(f"{item.text} = {stored(value, item.kind).text};")

@@ -142,7 +142,8 @@ def converted(value: Value, kind: Kind) -> Value:
     if value.kind == kind:
         return value
     if not isinstance(kind, Scalar) or not isinstance(value.kind, Scalar):
-        raise NoCError(f"{value.text or 'a tuple'} as {kind}")
+        where = "an array" if isinstance(kind, ArrayOf) else kind.name
+        raise NoCError(f"{value.text or 'a tuple'} as {where}")
     if kind is BOOL:
         return Value(f"{value.within(COMPARISON + 1)} != 0", BOOL, COMPARISON)
     if value.constant is not None and kind.rank > value.kind.rank:

@@ -132,8 +132,9 @@ static real tuples(float x, int32_t n) {
 
 static real arrays(float x, int32_t n) {
     float numbers[4];
-    for (int32_t n = 0; n < 4; n++) {
-        (&numbers[0])[n] = x;
+    /* C counts by another name */
+    for (int32_t nn = 0; nn < 4; nn++) {
+        (&numbers[0])[nn] = x * (float)n;
     }
     numbers[n] += 1.0f;
     float *part = &numbers[COLUMN_FIRST];

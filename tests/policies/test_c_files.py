@@ -14,7 +14,7 @@ import pytest
 
 from swarm_logistics_env import Scenario, Warehouse, policies, run_episode
 from swarm_logistics_env.core.errors import PolicyError, StudyError
-from swarm_logistics_env.policies import PolicySpec
+from swarm_logistics_env.policies import PolicySpec, c_compiler
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.world import observations as row
 
@@ -157,6 +157,28 @@ def test_a_system_without_a_compiler_is_told_what_to_install(
         policies.load(f"c:{EXAMPLE}")
     with pytest.raises(PolicyError, match=r"cannot read missing\.c: No such file"):
         policies.load("c:missing.c")
+
+
+@needs_compiler
+def test_a_program_that_no_cache_can_hold_is_compiled_for_this_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    no_folder = tmp_path / "file"
+    no_folder.touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(no_folder))
+    monkeypatch.setattr(c_compiler, "_cache", c_compiler._cache.__wrapped__)
+    program = c_compiler.compiled_controller(EXAMPLE)
+    assert program.parent.name.startswith("swarm-logistics-")
+    assert [*program.parent.iterdir()] == [program]
+    monkeypatch.setattr(c_compiler, "_cache", lambda: program.parent)
+    policy = policies.load(f"c:{EXAMPLE}")
+    policy.reset(2, 0)
+    assert policy.act(rows(2)).shape == (2, 4)
+
+
+def test_a_file_of_another_language_is_refused() -> None:
+    with pytest.raises(PolicyError, match=r"wanderer\.py: should end in \.c or \.cpp$"):
+        c_compiler.compiled_controller(EXAMPLE.with_suffix(".py"))
 
 
 @needs_compiler

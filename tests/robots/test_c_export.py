@@ -20,6 +20,7 @@ from swarm_logistics_env.policies.c_files import CFile
 from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import Network, PolicyCard, tensor_shapes
 from swarm_logistics_env.policies.policy import start
+from swarm_logistics_env.robots import c_sizes
 from swarm_logistics_env.robots.c_export import write_c
 from swarm_logistics_env.robots.c_sizes import compiler_for_cortex_m4, sizes_of
 from swarm_logistics_env.world.motion.memory import N_COLUMNS
@@ -316,5 +317,10 @@ def test_what_they_take_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     times = r"a step on this machine \(.+\): median ([\d.]+) us, longest ([\d.]+) us of 12,500"
     median, longest = map(float, re.search(times, text).groups())  # type: ignore[union-attr]
     assert 0.0 < median <= longest
+    monkeypatch.setattr(c_sizes, "_N_STEPS", 5)
+    monkeypatch.setattr(c_sizes, "compiler_for_cortex_m4", lambda: ["gcc", "-DSWARM_DOUBLE"])
+    assert re.search(r"cc: .*\ngcc -DSWARM_DOUBLE: [\d,]+ bytes of flash, at most", str(files))
+    monkeypatch.setattr(c_sizes, "compiler_for_cortex_m4", lambda: None)
+    assert "\nneither arm-none-eabi-gcc nor ziglang here: sizes on a Cortex-M4" in str(files)
     monkeypatch.setenv("CC", "no-such-compiler")
     assert "neither sizes nor times: cannot run the compiler no-such-compiler" in str(files)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import math
+import re
+import runpy
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -15,6 +17,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env.core.errors import PolicyError
+from swarm_logistics_env.robots.c_parts import Parts
 from swarm_logistics_env.robots.c_program import Program
 from swarm_logistics_env.robots.c_sizes import WARNINGS
 from swarm_logistics_env.robots.c_values import DOUBLE, FLOAT, INT, ArrayOf, Known, Value
@@ -73,7 +76,7 @@ def tuples(x: float, n: int) -> float:
 
 def arrays(x: float, n: int) -> float:
     numbers = np.empty(4, np.float32)
-    numbers[0:4] = x
+    numbers[0:4] = x * n  # C counts by another name
     numbers[n] += 1.0
     part = numbers[COLUMN.first : COLUMN.second + 1]
     part[1] -= 4.0
@@ -93,6 +96,26 @@ def exchanging_items(x: float, n: int) -> float:
     pair = np.empty(2, np.float32)
     pair[0], pair[1] = pair[1], pair[0]
     return x + n
+
+
+def ordered(x: float, n: int) -> tuple[float, float]:
+    return (x, 1.0) if x > 1.0 else (n, n)
+
+
+def settled(x: float, n: int) -> float:
+    numbers = np.empty(3, np.float32)
+    numbers[0:3] = x
+    first, second, third = numbers
+    numbers[1] += 1.0
+    unread = x * 3.0  # noqa: F841
+    low, high = ordered(x, n)
+    if n > 2:
+        low -= 1.0
+    elif COLUMN.second < COLUMN.first:
+        low = high
+    else:
+        low += 3.0 if COLUMN.second > 1 else float(first)
+    return float(low * 10.0 + high + second * third - first)
 
 
 def stepping(numbers: Any, n: int) -> None:
@@ -135,13 +158,21 @@ def as_c(function: Callable[..., Any], folder: Path) -> Any:
 
 @pytest.mark.skipif(not shutil.which("gcc"), reason="needs gcc")
 @pytest.mark.parametrize(
-    "function", [whole_numbers, rest, choices, tuples, arrays], ids=lambda f: f.__name__
+    "function",
+    [whole_numbers, rest, choices, tuples, arrays, settled],
+    ids=lambda f: f.__name__,
 )
 def test_c_computes_what_python_computes(function: Callable[..., Any], tmp_path: Path) -> None:
     run = as_c(function, tmp_path)
     places = range(4)
     for x, n in product((-2.5, -1.75, -0.5, -0.25, 0.0, 0.5, 0.75, 1.5, 2.5, 3.25), places):
         assert run(x, n) == pytest.approx(float(function(x, n)), abs=1e-5), (x, n)
+
+
+def test_a_branch_that_is_never_taken_is_not_written() -> None:
+    written = Program().function(settled, [Value("x", FLOAT), Value("n", INT)])
+    assert "    } else {\n        low += 3.0f;\n    }\n" in written.text
+    assert "low = high" not in written.text
 
 
 @pytest.mark.parametrize(
@@ -163,6 +194,77 @@ def test_what_has_no_c_is_told_with_its_line(function: Callable[..., Any], messa
         Program().function(function, [Value("x", FLOAT), Value("n", INT)])
 
 
+# Kernels of x, a float, and n, an integer.
+KERNELS = """\
+import math
+from typing import NamedTuple
+import numpy as np
+TABLE = np.arange(4.0)
+class Pair(NamedTuple):
+    first: float
+    second: float
+def pair_of(x):
+    return x, x
+def kernel(x, n):
+    numbers = np.empty(4, np.float32)
+"""
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("return [x]", "List"),
+        ("return n << 1", "LShift"),
+        ("return x + TABLE", "TABLE as a number"),
+        ("return x.real", "x.real"),
+        ("return x[0]", "x[..]"),
+        ("return TABLE[x]", "the index x"),
+        ("return numbers[:2].max()", "a slice of numbers without its first and last column"),
+        ("return numbers[0:2:1].max()", "a slice of numbers without its first and last column"),
+        ("return round(x, ndigits=1)", "a call with named arguments"),
+        ("return x(1.0)", "a call of x"),
+        ("return Pair(*pair_of(x))", "Pair(*..) of what is not known"),
+        ("return math.floor(x)", "a call of floor"),
+        ("return len(x)", "the length of x"),
+        ("return x + numbers", "x and numbers as numbers"),
+        ("return pair_of(x) * n", "pair_of(x) * n"),
+        ("return x, (x, x)", "a tuple of tuples"),
+        ("return not (x, n)", "a tuple as bool"),
+        ("return not pair_of(x)", "pair_of(x) as bool"),
+        ("n = x", "x, of kind float, as int32_t"),
+        ("for a, b in TABLE: pass", "a loop of several variables"),
+        ("for k in range(0, n, 2): pass", "a loop by steps"),
+        ("for entry in TABLE: pass", "a loop over TABLE"),
+        ("others = np.empty(n, np.float32)", "an array whose length is not constant"),
+        ("numbers.flat = x", "an assignment to numbers.flat"),
+        ("numbers += x", "a change of all of numbers"),
+    ],
+)
+def test_a_line_that_has_no_c_is_told_with_what_has_none(
+    line: str, message: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "kernel.py"
+    path.write_text(f"{KERNELS}    {line}\n    return n")
+    kernel = runpy.run_path(str(path))["kernel"]
+    with pytest.raises(PolicyError, match=f": no C for `.*`: {re.escape(message)}$"):
+        Program().function(kernel, [Value("x", FLOAT), Value("n", INT)])
+
+
+def test_records_and_tables_of_one_name_are_refused() -> None:
+    def sum_of(record: Any, other: Any) -> float:
+        return record.first + other.first  # type: ignore[no-any-return]
+
+    program = Program()
+    pair = Known(COLUMN, "columns", is_fixed=True)
+    program.function(sum_of, [pair, Known(Columns(1, 2), "columns", is_fixed=True)])
+    with pytest.raises(PolicyError, match=r"^two records are called columns"):
+        program.function(sum_of, [pair, Known(Columns(1, 3), "columns", is_fixed=True)])
+    parts = Parts()
+    assert parts.table("_steps", TABLE) == parts.table("steps", TABLE.copy()) == "STEPS"
+    with pytest.raises(PolicyError, match=r"^two tables are called STEPS"):
+        parts.table("STEPS", TABLE[:3])
+
+
 def test_rows_of_which_there_are_several_have_no_c() -> None:
     def first_of(numbers: Any, n: int) -> float:
         first: float = numbers[n, 0]
@@ -170,7 +272,7 @@ def test_rows_of_which_there_are_several_have_no_c() -> None:
 
     for count in (1, 2):
         rows = Value("numbers", ArrayOf(FLOAT, (count, 3)))
-        with pytest.raises(PolicyError, match="numbers: more rows than one"):
+        with pytest.raises(PolicyError, match=r": numbers: more rows than one$"):
             Program().function(first_of, [rows, Value("n", INT)])
 
 

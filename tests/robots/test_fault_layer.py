@@ -135,6 +135,29 @@ def test_a_late_radio_sends_what_was_said_before_it_failed() -> None:
     assert timers == [0.0, 1.0, 2.0, 3.0, 4.0, 3.0, 4.0, 5.0]
 
 
+def test_a_radio_of_random_words_says_others_in_each_period() -> None:
+    layer = layer_of("message_random:1@1", control_period=1.0, message_size=2)
+    sent = [layer.broadcast(3.0, [0.5, 0.5], float(second)) for second in range(100)]
+    words = np.array([broadcast.message for broadcast in sent if broadcast])
+    assert words[0].tolist() == [0.5, 0.5]
+    assert len({*words[1:].ravel()}) == 198
+    assert np.abs(words).max() <= 1.0
+    assert words[1:].min() < -0.9
+    assert words[1:].max() > 0.9
+
+
+def test_whose_view_is_reduced_sees_no_station_beyond_it() -> None:
+    layer = layer_of("view_reduced:1@10", battery=1000.0)
+    reach = Scenario(n_robots=1).view_range
+    sensed = np.zeros(row.N_COLUMNS + row.N_BATTERY_COLUMNS, np.float32)
+    first = row.N_COLUMNS + row.BATTERY.stations
+    sensed[row.N_COLUMNS : first] = 0.7
+    sensed[first:] = [1.0, 0.9 * reach, 0.0, 1.0, 0.0, 0.4 * reach]
+    np.testing.assert_array_equal(layer.sensed(sensed, 9.9), sensed)
+    of_battery = layer.sensed(sensed, 10.0)[row.N_COLUMNS :]
+    assert of_battery == pytest.approx([0.7, 0.7, 1.0, 0.0, 0.4 * reach, 0.0, 0.0, 0.0])
+
+
 def test_trials_of_robots_are_a_table_that_judge_reads(tmp_path: Path) -> None:
     path = tmp_path / "trials.csv"
     path.touch()  # an empty file gets its head, too
@@ -149,8 +172,10 @@ def test_trials_of_robots_are_a_table_that_judge_reads(tmp_path: Path) -> None:
         append_trial(path, ["FM4", "FM1"], swarm, 0, 1)
 
 
-def test_a_fault_by_role_and_a_robot_that_is_not_there_are_refused() -> None:
+def test_a_fault_by_role_or_of_a_battery_and_a_robot_that_is_not_there_are_refused() -> None:
     with pytest.raises(FaultError, match="role = 'carrier': should be None"):
         layer_of("FM4:1:carrier")
+    with pytest.raises(FaultError, match="mode = cell_fades: should be another, no layer weakens"):
+        layer_of("motor_slow:1", "cell_fades:1", battery=1000.0)
     with pytest.raises(FaultError, match="number = 1: robots are 0 to 0"):
         FaultLayer([], Scenario(n_robots=1), number=1, seed=0)

@@ -112,6 +112,12 @@ def test_a_robot_whose_rows_are_lost_decides_once_for_each_period() -> None:
         np.testing.assert_array_equal(command, commands[-1])
 
 
+def test_it_tells_its_policy_and_what_is_set() -> None:
+    assert repr(OverMiddleware("homing")) == "OverMiddleware('homing')"
+    settings = repr(OverMiddleware("homing", delay=0.05, loss=0.1))
+    assert settings == "OverMiddleware('homing', loss=0.1, delay=0.05)"
+
+
 def test_what_cannot_be_is_refused() -> None:
     with pytest.raises(RobotError, match="loss"):
         OverMiddleware("homing", loss=1.5)
