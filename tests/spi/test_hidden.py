@@ -47,6 +47,8 @@ def test_a_small_effect_waits_for_the_seeds_that_would_show_a_stall() -> None:
     few: Any = spi.robustness(STEADY[:6], FAULTY[:6], n=25, m=2)
     assert few.low > 0.0
     assert (few.verdict, "hidden_stalls" in few.flags) == ("open", True)
+    p_values = f"p = {few.p_seen:.3g}, {few.p_value:.3g} with what these runs may hide"
+    assert str(few).endswith(f"above 0: open (6 paired seeds, {p_values})")
     needed = spi.seeds_against_stalls(few) or 0
     assert needed > 6
     times = -(-needed // 6)

@@ -105,6 +105,13 @@ def test_the_clearest_size_tells_which_runs_of_the_others_collapsed() -> None:
     assert spi.collapsed_runs(by_size) == {10: 3, 20: 20, 40: 29}
 
 
+def test_without_a_smaller_size_larger_ones_should_deliver_as_much_as_the_clearest() -> None:
+    rng = np.random.default_rng(0)
+    clearest = np.concatenate([rng.normal(60.0, 0.5, 20), rng.normal(20.0, 0.5, 20)])
+    larger = np.concatenate([rng.normal(62.0, 3.0, 36), [38.0, 39.0, 41.0, 42.0]])
+    assert spi.collapsed_runs({10: clearest, 20: larger}) == {10: 20, 20: 2}
+
+
 def test_the_critical_size_lies_where_half_collapse() -> None:
     size = spi.critical_size([10, 14, 20, 28, 40], [0, 0, 15, 30, 30], [30] * 5)
     assert size.value == pytest.approx(20.0, rel=0.03)

@@ -13,7 +13,7 @@ import pytest
 
 from swarm_logistics_env import Fault, Scenario
 from swarm_logistics_env.core import progress_bar
-from swarm_logistics_env.core.errors import SetupError
+from swarm_logistics_env.core.errors import SetupError, StudyError
 from swarm_logistics_env.study.attack import STORE, Attack, _covariance, attack, search
 from swarm_logistics_env.study.runs.engines import serial
 from swarm_logistics_env.study.runs.store import Runs
@@ -90,6 +90,17 @@ def test_what_cannot_be_searched_is_refused(tmp_path: Path) -> None:
     ):
         with pytest.raises(SetupError, match=reason):
             attack(settings, serial, tmp_path)
+
+
+def test_a_run_that_fails_ends_the_search_and_is_kept(tmp_path: Path) -> None:
+    def failing(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
+        for run in runs:
+            yield run, Outcome(error="Traceback\nValueError: no wheel\n")
+
+    with pytest.raises(StudyError, match=r"^a run failed: ValueError: no wheel$"):
+        attack(Attack("swarm-dt", SCENARIO), failing, tmp_path)
+    with Runs(tmp_path / STORE) as runs:
+        assert (len(runs), runs.succeeded()) == (1, set())
 
 
 def test_a_cap_on_the_runs_without_faults_is_told(tmp_path: Path) -> None:

@@ -204,6 +204,10 @@ def test_stored_study_is_judged_without_its_policies(
     alter(tmp_path / FILE_NAME, "UPDATE notes SET value = json_set(value, '$.code', 'older')")
     with pytest.raises(StudyError, match="was played under code version older"):
         Study.stored(tmp_path).run()
+    nobody = "UPDATE notes SET value = json_set(value, '$.identities', json('{}'))"
+    alter(tmp_path / FILE_NAME, nobody)
+    with pytest.raises(StudyError, match=r"does not know the identity of its policy Failing$"):
+        Study.stored(tmp_path)
 
 
 def test_failed_runs_are_rows_block_their_verdicts_and_are_tried_again(
@@ -314,4 +318,6 @@ def test_what_was_never_run_has_no_results_and_makes_no_store(tmp_path: Path) ->
     study = Study(seeds=2, out=tmp_path)
     with pytest.raises(StudyError, match="no study in"):
         study.results()
+    sized = Study(seeds=2, out=tmp_path, sizes=[{"values": [2, 4, 6]}])
+    assert sized.finished() == (0, 6)
     assert not any(tmp_path.iterdir())

@@ -52,7 +52,7 @@ def with_signs(
             f"Numbers are taken to have {thousands} between thousands and {decimal} before "
             f"decimals, as in {text}."
         )
-    if decimal is None and (text := _decimal_comma(columns)):
+    if decimal is None and (text := decimal_comma(columns)):
         decimal = ","
         notes.append(f"Decimals are taken to have a comma, as in {text}.")
     if decimal is None and thousands is None:
@@ -68,7 +68,7 @@ def _both_signs(columns: Sequence[Cells]) -> str | None:
     return min((text for text in texts if _BOTH_SIGNS.fullmatch(text)), default=None)
 
 
-def _decimal_comma(columns: Sequence[Cells]) -> str | None:
+def decimal_comma(columns: Sequence[Cells]) -> str | None:
     """Return a cell whose comma stands before decimals, if no cell has a point; None: none."""
     texts = {text for cells in columns for text in cells.texts if not means_no_number(text)}
     if any("." in text for text in texts):

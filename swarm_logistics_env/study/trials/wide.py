@@ -15,6 +15,7 @@ from shlex import quote
 from swarm_logistics_env.spi.inputs import IndicatorError
 
 from .column_name import ColumnName
+from .signs import decimal_comma
 from .table import Table
 from .trial import NO_FAULT_WORD
 from .words import CELLS, COLUMN_NAMES, MEANING, REPETITIONS, plain, usual_fault
@@ -37,7 +38,11 @@ Condition = dict[str, str]  # what a column is of: the cell of each new column, 
 
 
 def long_of(
-    table: Table, columns: Mapping[str, str], ignore: Sequence[str], wide: str | None
+    table: Table,
+    columns: Mapping[str, str],
+    ignore: Sequence[str],
+    wide: str | None,
+    decimal: str | None,
 ) -> Table:
     """Return a table with a row for each trial, of one with a column for each condition.
 
@@ -48,6 +53,7 @@ def long_of(
         ignore: names of columns to leave out.
         wide: what the columns differ in: a word of `COLUMN_NAMES`, or the name of a parameter;
             None: what their names say.
+        decimal: the sign before decimals in cells, as somebody says; None: nobody does.
 
     Raises:
         IndicatorError: `wide` is said of columns whose names do not tell it, or of no columns.
@@ -77,7 +83,17 @@ def long_of(
     else:
         names = {number: _UNIT.sub("", table.header[number]) for number in numbers}
         conditions = {} if is_long else _read_off(names)
+    if decimal == "," or (decimal is None and decimal_comma(table.columns_in_order)):
+        conditions = {n: _with_commas(condition) for n, condition in conditions.items()}
     return _melted(table, conditions, columns) if conditions else table
+
+
+def _with_commas(condition: Condition) -> Condition:
+    """Return a condition whose parameters have a decimal comma, as the cells have."""
+    return {
+        name: value if name in MEANING else value.replace(".", ",")
+        for name, value in condition.items()
+    }
 
 
 def _read_off(names: Mapping[int, str]) -> dict[int, Condition]:

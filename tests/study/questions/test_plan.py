@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.core.errors import FaultError, StudyError, SwarmLogisticsError
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
+from swarm_logistics_env.policies.catalogue import WEIGHTS
 from swarm_logistics_env.study.questions.comparison import OTHER_BEHAVIOUR
 from swarm_logistics_env.study.questions.presets import PRESETS
 from swarm_logistics_env.study.studies import Study
@@ -112,6 +114,15 @@ def test_cases_and_runs_are_known_by_content() -> None:
             "ablations.onset = 500 s: should be less than duration",
         ),
         ({"parameters": [{"name": "n_robots", "values": [1, 2]}]}, "belong in `sizes`"),
+        (
+            {"parameters": [{"name": "delivery_width", "values": [0, 1]}]},
+            "values = [0, 1]: should start with x_o above 0 and not repeat it",
+        ),
+        (
+            {"parameters": [{"name": "delivery_width", "values": [2, 1, 2]}]},
+            "values = [2, 1, 2]: should start with x_o above 0 and not repeat it",
+        ),
+        ({"scenario": 3}, "scenario = 3: should be a table of fields or a Scenario"),
         ({"policies": ["swarm-dt", "swarm-dt"]}, "given twice"),
         ({"policies": [{"nam": "swarm-dt"}]}, "PolicySpec has no field 'nam'; did you mean 'name'"),
     ],
@@ -121,6 +132,17 @@ def test_bad_specification_is_refused_in_words(fields: dict[str, Any], words: st
         Study(**fields).plan()
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_policy_files_with_one_name_on_their_cards_are_called_by_their_paths(
+    tmp_path: Path,
+) -> None:
+    paths = [str(tmp_path / f"{number}.safetensors") for number in range(2)]
+    for path in paths:
+        shutil.copy(WEIGHTS / "ppo-delivery.safetensors", path)
+    for policies, titles in ((paths, paths), (paths[:1], ["ppo-delivery"])):
+        specification = Study(policies=policies, sizes=[{"values": [2, 3]}]).specification
+        assert [policy.title for policy in specification.policies] == titles
 
 
 def test_every_preset_can_be_planned_and_an_unknown_one_is_refused() -> None:

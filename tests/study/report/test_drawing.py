@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
@@ -42,6 +43,19 @@ def test_figures_are_drawn_whatever_backend_is_set(backend: str, left: str | Non
     named, used = done.stdout.split()
     assert named == backend
     assert left is None or used.lower() == left
+
+
+def test_matplotlib_is_imported_without_the_backend_that_is_set_and_has_it_afterwards(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stand_in = "import os\nat_import = os.environ.get('MPLBACKEND')\nrcParams = {}\n"
+    (tmp_path / "matplotlib.py").write_text(stand_in)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "matplotlib")
+    monkeypatch.setenv("MPLBACKEND", "TkAgg")
+    module = drawing._matplotlib()
+    assert (module.at_import, module.rcParams) == (None, {"backend": "TkAgg"})
+    assert os.environ["MPLBACKEND"] == "TkAgg"
 
 
 def test_thirty_six_series_have_marks_of_their_own() -> None:

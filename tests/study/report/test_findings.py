@@ -31,6 +31,17 @@ def test_results_say_their_answer(tmp_path: Path) -> None:
         assert f"<p>{sentence.replace('<', '&lt;').replace('>', '&gt;')}</p>" in html
 
 
+def test_three_policies_have_their_overview_above_the_questions(tmp_path: Path) -> None:
+    rows = [line for name in "abc" for line in TABLE.replace("<b>", name).splitlines()[1:]]
+    (tmp_path / "mine.csv").write_text("\n".join(["policy,robots,P", *rows]))
+    results = judge(tmp_path / "mine.csv")
+    overview = answer(results).overview
+    assert overview is not None
+    head, _, rest = results._repr_html_().partition(html_table(overview))
+    assert "<table" not in head
+    assert html_table(answer(results).section) in rest
+
+
 def test_a_table_keeps_its_columns_and_leaves_out_empty_lines() -> None:
     section = Section("title", ("a & b", "c"), (("1", "<2>"),), ("below", ""))
     head, _, body = html_table(section).partition("</thead>")

@@ -73,6 +73,10 @@ def test_each_table_has_a_label_of_its_own_and_a_caption_that_can_stay(latex: st
         assert caption.endswith(
             "by Holm's method over all questions on an indicator of one policy."
         )
+    titles = ("A b", "a: b", "c", "A B")
+    tables = PaperTables("", tuple(Section(title, ("c",), (("x",),)) for title in titles), {})
+    labels = re.findall(r"\\label{(.*)}", latex_tables(tables))
+    assert labels == ["tab:a-b", "tab:a-b-2", "tab:c", "tab:a-b-3"]
     assert "continued" not in latex
     assert latex.startswith("% In the preamble: \\usepackage{booktabs}\n")
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 
+from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.terminal_answer import terminal_answer
 from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.tasks.outcome import Outcome
 from swarm_logistics_env.study.verdicts.results import judge
 from tests.made_up import delivered, judged
 
@@ -17,6 +19,15 @@ def test_p_of_no_delivery_has_the_limit_of_its_runs() -> None:
     assert "= 0 (at most 0.75 at 95 %, as none of 4 runs delivered" in " ".join(
         answer(nothing).head
     )
+
+    def failed_once(_: str, setting: Setting, seed: int) -> Outcome:
+        return Outcome(error="x") if (setting.value, seed) == (2, 1) else delivered(0)
+
+    study = Study(seeds=4, sizes=[{"values": [2, 3]}], scenario={"n_robots": 2})
+    words = (
+        "0 (at most 1.00 at 95 %, as none of 3 runs delivered anything; 1 of 4 runs failed) items"
+    )
+    assert f"swarm-dt: P = {words}" in " ".join(answer(judged(study, failed_once)).head)
 
 
 def test_p_of_a_policy_is_that_of_its_first_table() -> None:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure as Canvas
 
 from swarm_logistics_env.study import Study
 from swarm_logistics_env.study.questions.comparison import Setting
+from swarm_logistics_env.study.report import section
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.document import document
 from swarm_logistics_env.study.report.terminal_answer import terminal_answer
@@ -57,6 +58,25 @@ def test_the_first_line_has_the_direction_of_the_rows() -> None:
     row = next(line for line in answer(results).lines if "N = 25" in line.question)
     # As the sentence has it.
     assert (row.question, row.value) == ("times P, N = 25", "0.50")
+
+
+def test_the_first_line_says_by_how_much_other_conditions_differ_and_which_level_is_another() -> (
+    None
+):
+    def play_ahead(policy: str, setting: Setting, seed: int) -> Outcome:
+        factor = {"FM4": 3, "FM1": 4}.get(setting.name, 2) if policy == "homing" else 1
+        return delivered(factor * (100 + 3 * (seed % 4)), digest=f"{policy} {setting} {seed}")
+
+    words = answer(judged(study_of("homing", "swarm-dt"), play_ahead)).comparison
+    assert words.endswith("; also more in 3 of 3 other conditions (2.00 to 4.00 times).")
+    study = Study(
+        policies=["homing", "swarm-dt"], seeds=60, until_clear=True, sizes=[SIZES],
+        compares_policies=True, scenario={"restock": True},
+    )  # fmt: skip
+    results = judged(study, play)
+    level = section.percent(results.level)
+    assert level != "95 %"
+    assert f"that of swarm-dt (N = 25, {level}); also more" in answer(results).comparison
 
 
 def test_policies_share_the_row_of_a_question_in_the_figure_and_the_legend_names_them() -> None:

@@ -19,14 +19,17 @@ from swarm_logistics_env.study.report.latex import latex_tables
 from swarm_logistics_env.study.report.section import (
     bracketed,
     fixed,
+    interval_to_clear,
     join_names,
     levels,
     percent,
+    time_to_clear,
 )
 from swarm_logistics_env.study.report.terminal_answer import terminal_answer
 from swarm_logistics_env.study.report.write import markdown, write_report
-from swarm_logistics_env.study.verdicts.results import StudyResults
-from tests.made_up import looked_at
+from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.verdicts.results import StudyResults, judge
+from tests.made_up import delivered, looked_at
 
 NUMBERS = st.floats(-3.0, 3.0) | st.floats(-0.02, 0.02) | st.floats(0.98, 1.02)
 
@@ -76,6 +79,7 @@ def test_every_surface_names_the_level_that_it_prints(
     }
     assert len({*level_by_question.values()}) == 3
     assert "95 %" not in level_by_question.values()
+    assert percent(stopped.level) == answer(stopped).level
     write_report(stopped, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     full_document = document(stopped)
@@ -164,6 +168,19 @@ def test_a_paper_is_told_conditions_seeds_and_why_each_question_was_played_no_fu
         "looked at after 10, 20, 30, 40, 50, 60 seeds: of 2 questions 1 stopped where clear, "
         "1 after all 60 seeds."
     )
+
+
+def test_the_time_to_clear_of_several_trainings_is_that_of_their_means() -> None:
+    plan = Study(policies=["ppo-robust@all"], seeds=3, sizes=[{"values": [2, 4]}]).plan()
+    outcomes = {
+        (run.case.key, run.seed): delivered(5, ended_at=100.0 + number**2 % 17, all_delivered=True)
+        for number, run in enumerate(plan.runs)
+    }
+    cell = judge(plan, outcomes).cells[0]
+    times = np.array([outcome.ended_at for outcome in cell.outcomes]).reshape(7, 3)
+    expected = spi.mean_interval(times)
+    assert interval_to_clear(cell) == expected != spi.median_interval(times.ravel())
+    assert time_to_clear(cell) == bracketed(expected, 0)
 
 
 def test_names_are_joined_as_a_sentence_has_them() -> None:

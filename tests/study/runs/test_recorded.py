@@ -10,10 +10,12 @@ import pandas as pd
 import pytest
 
 from swarm_logistics_env import judge, spi
+from swarm_logistics_env.core import progress_bar
 from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.study.questions.comparison import OTHER_BEHAVIOUR
 from swarm_logistics_env.study.report.document import document
 from swarm_logistics_env.study.report.write import markdown
+from swarm_logistics_env.study.runs import recorded
 from swarm_logistics_env.study.runs.recorded import RecordedStudy
 from swarm_logistics_env.study.runs.store import Runs
 from swarm_logistics_env.study.studies import Study
@@ -289,6 +291,16 @@ def test_study_is_neither_overwritten_nor_run_into(tmp_path: Path, small: dict[s
             study.run()
     with Runs.existing(tmp_path / "out") as runs:
         assert len(runs) == 5
+
+
+def test_how_many_trials_are_written_is_told_every_so_often(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(progress_bar, "LINE_EVERY", 0.0)
+    monkeypatch.setattr(recorded, "_PROGRESS_EVERY", 2)
+    imported(tmp_path, "robots,delivered\n5,9\n5,11\n5,10\n10,18\n10,22\n")
+    lines = [line.partition(",")[0] for line in capsys.readouterr().err.splitlines()]
+    assert lines == ["import: 2 of 5 trials", "import: 4 of 5 trials"]
 
 
 def test_p_o_is_of_trials_without_a_fault_and_repeated_ones_are_their_null(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from swarm_logistics_env import judge
 from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.study.runs.engines import Shard
 from swarm_logistics_env.study.runs.notes import StoredStudy, merge
@@ -84,4 +85,12 @@ def test_what_is_not_one_study_is_not_merged(
     with pytest.raises(StudyError, match=words):
         merge([full, other], tmp_path / "both")
     assert rows(other) == before
+    assert not (tmp_path / "both" / FILE_NAME).exists()
+
+
+def test_recorded_trials_are_not_merged(full: Path, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("robots,p\n4,1\n8,2\n")
+    judge(tmp_path / "t.csv", out=tmp_path / "lab")
+    with pytest.raises(StudyError, match="lab was imported: only studies that were run are merg"):
+        merge([full, tmp_path / "lab"], tmp_path / "both")
     assert not (tmp_path / "both" / FILE_NAME).exists()

@@ -25,6 +25,7 @@ from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.core.records import write_csv
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
+from swarm_logistics_env.study.runs import store
 from swarm_logistics_env.study.runs.rows import COUNTED
 from swarm_logistics_env.study.runs.store import FILE_NAME, Runs, export
 from swarm_logistics_env.study.studies import Study
@@ -260,6 +261,21 @@ def test_two_processes_may_make_the_store_at_once(tmp_path: Path) -> None:
             assert [maker.stdout and maker.stdout.readline() for maker in makers] == ["made\n"] * 2
             with Runs.existing(directory) as runs:
                 assert runs.notes() == {"0": "here", "1": "here"}
+
+
+def test_a_store_waits_for_whoever_makes_it_but_not_for_ever(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / FILE_NAME
+    with closing(sqlite3.connect(path, isolation_level=None)) as database:
+        database.execute("BEGIN IMMEDIATE")
+        with monkeypatch.context() as patch:
+            patch.setattr(store, "TIMEOUT", -1.0)
+            with pytest.raises(StudyError, match=rf"use the store {path}: database is locked"):
+                Runs(path)
+        monkeypatch.setattr("time.sleep", lambda _: database.rollback())
+        with Runs(path) as runs:
+            assert len(runs) == 0
 
 
 def test_a_new_store_is_there_once_it_is_whole_and_never_in_part(tmp_path: Path) -> None:

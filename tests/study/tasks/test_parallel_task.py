@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gymnasium.spaces import Box
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.core.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.core.errors import FaultError, StudyError, SwarmLogisticsError
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks import (
@@ -175,6 +176,33 @@ class Wrong:
         return np.full(len(observations), 7)
 
 
+class Few:
+    def act(self, observations: Any) -> Any:
+        return np.ones(len(observations) - 1, dtype=int)
+
+
+class Driven(Lane):
+    """Takes a number with a fraction for an action."""
+
+    def action_space(self, agent: str) -> Any:
+        return Box(0.0, 2.0, (1,), np.float32)
+
+    def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:
+        assert {action.dtype for action in actions.values()} == {np.dtype(np.float32)}
+        return super().step({agent: int(action[0]) for agent, action in actions.items()})
+
+
+class Driver:
+    def act(self, observations: Any) -> Any:
+        return [[1.5]] * len(observations)
+
+
+def test_an_array_of_actions_has_the_type_of_its_space() -> None:
+    run = only_run(task_of(make_env=Driven, steps=40), policies=[Driver()]).play()
+    assert run.error is None
+    assert run.delivered > 0
+
+
 def costs(env: object, rewards: object, infos: object) -> float:
     return -2.0
 
@@ -191,6 +219,7 @@ SMALLER = task_of(make_env=lambda n_robots: Lane(2))
     ("task", "policy", "words"),
     [
         (LANE, Wrong(), "PolicyError: action 7 of robot 0: should be in Discrete(3)"),
+        (LANE, Few(), "PolicyError: 3 actions for 4 robots"),
         (task_of(performance=costs), "walker", "step 1 adds -2: should be 0 or more; the indic"),
         (task_of(performance=lambda *_: np.nan), "walker", "adds nan: should be 0 or more"),
         (SCORED, "walker", "the score -10 is below the reference -5"),
@@ -230,6 +259,8 @@ def test_a_task_that_cannot_be_is_refused(fields: dict[str, Any], words: str) ->
         ({"task": "json:dumps"}, "is no task: should have the attributes of tasks.Task"),
         ({"scenario": {"lenght": 3}}, "did you mean 'length'?"),
         ({"scenario": {"length": 6.5}}, "6.5: should be a whole number"),
+        ({"scenario": {"length": "six"}}, "task lane: length = 'six': should be a number"),
+        ({"scenario": {"length": True}}, "task lane: length = True: should be a number"),
         ({"policies": ["swarm-dt"]}, "the task has no policy 'swarm-dt'"),
         ({"faults": [{"modes": ["silnt"]}]}, "'silnt'; did you mean 'silent'?"),
         ({"faults": [{**FAULT, "onsets": [5]}]}, "not from 5 s on, so FT is not defined here"),
@@ -241,6 +272,16 @@ def test_what_cannot_be_is_refused_before_any_run(fields: dict[str, Any], words:
         only_run(**{"task": LANE, **fields})
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_task_has_the_faults_of_its_failure_modes_alone() -> None:
+    with pytest.raises(FaultError, match="task lane: no failure mode 'silnt'; did you mean 'sil"):
+        LANE.fault("silnt", 1, 0.0, None, {})
+
+
+def test_what_is_no_number_is_no_field_to_vary() -> None:
+    task = task_of(parameters={"length": 6, "name": "A", "is_loud": True})
+    assert [*task.fields] == ["duration", "length"]
 
 
 @pytest.mark.unmeasured

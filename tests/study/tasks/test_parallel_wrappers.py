@@ -198,6 +198,17 @@ def test_the_number_of_agents_is_drawn_for_each_episode() -> None:
         ChangingAgents(lambda n: Nested(n) if n == 1 else Lane(n), [1, 2])
 
 
+def test_environments_of_all_numbers_of_agents_are_closed() -> None:
+    closed_sizes = []
+
+    class Closing(Lane):
+        def close(self) -> None:
+            closed_sizes.append(self.n_robots)
+
+    ChangingAgents(Closing, [2, 5, 2]).close()
+    assert closed_sizes == [2, 5]
+
+
 def test_examples_run() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # theirs

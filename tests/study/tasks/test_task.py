@@ -15,7 +15,12 @@ from swarm_logistics_env.core.errors import ScenarioError, StudyError
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks.task import Case
-from swarm_logistics_env.study.tasks.warehouse_task import EPISODE_CODE, WAREHOUSE
+from swarm_logistics_env.study.tasks.warehouse_task import (
+    CLEARING,
+    EPISODE_CODE,
+    RECORDED,
+    WAREHOUSE,
+)
 from tests.study.tasks.lane import LANE
 
 PACKAGE = Path(swarm_logistics_env.__file__).parent
@@ -111,6 +116,23 @@ def test_clearing_is_a_rate_that_no_number_of_items_caps() -> None:
     assert (outcome.time_to_clear, outcome.delivered) == (math.inf, 0.0)
     with pytest.raises(StudyError, match="restock = True: should be False"):
         Study(task="clearing", scenario={"restock": True})
+    # A preset keeps the time of the task, unless another is said.
+    for fields, duration in (({}, 3_000.0), ({"duration": 90.0}, 90.0)):
+        dots = CLEARING.vary(CLEARING.default, {"preset": "dots", **fields})
+        assert dots == Scenario.preset("dots").replace(duration=duration)
+
+
+def test_recorded_trials_are_not_played_again() -> None:
+    with pytest.raises(StudyError, match="cannot be played again: give a file with more of them"):
+        RECORDED.fault("jam", 1, 0.0, None, {})
+    study = Study(task=RECORDED.name, seeds=1, sizes=[{"values": [2, 4]}])
+    assert (
+        str(study.plan().runs[0].play().error)
+        .strip()
+        .endswith(
+            "StudyError: recorded trials cannot be played again: give a file with more of them"
+        )
+    )
 
 
 FILE = """

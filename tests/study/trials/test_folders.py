@@ -67,6 +67,12 @@ def test_trials_that_cannot_be_read_are_never_left_out(tmp_path: Path) -> None:
         (tmp_path / name).unlink()
 
 
+def test_of_many_files_of_other_kinds_five_are_named(tmp_path: Path) -> None:
+    write(tmp_path, **{"day1.csv": DAY, **{f"{number}.png": "" for number in range(6)}})
+    note = "Files of other kinds are left out: 0.png, 1.png, 2.png, 3.png, 4.png, ..."
+    assert read_trials(tmp_path).notes[1] == note
+
+
 @pytest.mark.parametrize("name", ["day1 (1).csv", "day1 - Copy.csv", "backup/day1.csv", "b.csv"])
 def test_a_second_copy_of_a_file_does_not_count(tmp_path: Path, name: str) -> None:
     text = DAY.replace("policy,", "").replace("A,", "")  # so that files name the policies

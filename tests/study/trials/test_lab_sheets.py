@@ -277,6 +277,34 @@ def test_an_empty_cell_of_a_wide_table_is_missing_unless_it_is_at_an_end(tmp_pat
         read_trials(path)
 
 
+def test_values_in_the_names_of_columns_are_a_parameter_with_their_unit(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text("robots;width=1,5 m;width=2 m\n4;5;6\n")
+    trials = read_trials(path)
+    assert [(row.parameters, row.performance) for row in trials.rows] == [
+        ((("width [m]", 1.5),), 5.0),
+        ((("width [m]", 2.0),), 6.0),
+    ]
+    assert "'width=1,5 m' (width [m] 1.5), 'width=2 m' (width [m] 2)" in trials.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        ("robots,day,load", "has no two columns that could be conditions: it has 'robots', 'day',"),
+        ("robots,1 m,wide", "has a column 'wide': should have one number in its name, else say "),
+        ("robots,1 m,2 to 3 m", "--wide policy or --wide fault, or leave it out by --ignore '2 to"),
+    ],
+)
+def test_what_columns_differ_in_is_refused_where_their_names_do_not_tell_it(
+    header: str, words: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text(f"{header}\n4,5,6\n4,7,8\n")
+    with pytest.raises(spi.IndicatorError, match=rf"^--wide width: .*{words}"):
+        read_trials(path, wide="width")
+
+
 def test_a_german_column_that_may_tell_robots_apart_is_asked_about(tmp_path: Path) -> None:
     path = tmp_path / "sheet.csv"
     rows = "".join(f"{trial};{robot};{robot + trial}\n" for trial in (1, 2) for robot in (1, 2, 3))

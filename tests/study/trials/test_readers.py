@@ -76,7 +76,7 @@ def test_workbooks_and_parquet_are_read(ending: str, tmp_path: Path) -> None:
 def test_a_file_that_is_not_what_its_name_says_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pytest.importorskip("openpyxl")
+    openpyxl = pytest.importorskip("openpyxl")
     pytest.importorskip("pyarrow")
     FRAME.to_excel(tmp_path / "real.xlsx", index=False)
     FRAME.to_parquet(tmp_path / "real.parquet")
@@ -97,6 +97,9 @@ def test_a_file_that_is_not_what_its_name_says_is_refused(
         path.write_bytes(content)
         with pytest.raises(spi.IndicatorError, match=words):
             read_trials(path)
+    openpyxl.Workbook().save(tmp_path / "empty.xlsx")
+    with pytest.raises(spi.IndicatorError, match=r"empty\.xlsx is empty: should have a row of col"):
+        read_trials(tmp_path / "empty.xlsx")
     with zipfile.ZipFile(tmp_path / "c.xlsx", "w") as archive:
         archive.writestr("nothing.txt", "no workbook")
     with pytest.raises(spi.IndicatorError, match=r"c\.xlsx is a damaged workbook"):
@@ -105,6 +108,19 @@ def test_a_file_that_is_not_what_its_name_says_is_refused(
     for name in ("real.xlsx", "real.parquet"):
         with pytest.raises(spi.IndicatorError, match="unpacks to 0 MB: should be at most 0 MB"):
             read_trials(tmp_path / name, columns=COLUMNS)
+
+
+def test_a_table_in_parquet_with_two_names_of_a_column_is_damaged(tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    table = pyarrow.Table.from_pandas(FRAME)
+    odd_table = table.rename_columns(["robots", "fault", "m", "items"])
+    parquet.write_table(
+        odd_table.replace_schema_metadata(table.schema.metadata), tmp_path / "t.parquet"
+    )
+    names = r"'m', 'items', or 'robots', 'fault', 'm', 'boxes'\)"
+    with pytest.raises(spi.IndicatorError, match=rf"is a damaged table in Parquet .*{names}"):
+        read_trials(tmp_path / "t.parquet")
 
 
 def pogema_results() -> list[dict[str, Any]]:
@@ -221,6 +237,14 @@ def test_a_record_of_pogema_without_a_number_is_refused(
     with pytest.raises(spi.IndicatorError) as caught:
         read_trials(path)
     assert str(caught.value).startswith(f"{path}, {words}")
+
+
+def test_results_of_pogema_without_a_number_in_any_record_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "results.json"
+    metrics = {"throughput_over_time": [0.1, 0.2]}
+    path.write_text(json.dumps([{**pogema_results()[0], "metrics": metrics}]))
+    with pytest.raises(spi.IndicatorError, match=r"json: should have a metric that is one number"):
+        read_trials(path)
 
 
 class Deliveries(gymnasium.Env[np.ndarray, Any]):

@@ -109,6 +109,9 @@ TRIALS: dict[str, tuple[str, dict[str, Any]]] = {
     "a column a policy": (WIDE, {"wide": "policy"}),
     "a column a size": ("seed,4 robots,8 robots,16 robots\n1,5,9,15\n2,6,10,16\n3,7,,\n", {}),
     "a column a width": ("robots,1 m,2 m\n4,5,6\n4,7,8\n", {"wide": "width"}),
+    "commas in names and cells": ("N;width=1,5 m;width=2 m\n4;5,25;6,5\n4;5,5;7,5\n", {}),
+    "commas in names alone": ("N;width=1,5 m;width=2 m\n4;5.25;6\n4;5.5;7\n", {}),
+    "commas that are said": ("N;1.5 m;2 m\n4;5;6\n4;5;7\n", {"wide": "width", "decimal": ","}),
     "a column a repetition": ("robots,run 1,run 2,run 3\n4,5,6,7\n8,9,10,\n", {}),
     "repetitions below names": (
         "hall,none,,jam 1 of 8,\n,run 1,run 2,run 1,run 2\nA,20,21,14,15\n",

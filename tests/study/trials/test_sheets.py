@@ -51,7 +51,14 @@ def put(cell: str, value: object) -> Callable[[Any], None]:
 
 
 @pytest.mark.parametrize(
-    "ranges", [("C5:C7", "D5:D7"), ("A2:A7",), ("A2:A7", "B2:B4", "B5:B7"), ("A2:B2",)]
+    "ranges",
+    [
+        ("C5:C7", "D5:D7"),
+        ("A2:A7",),
+        ("A2:A7", "B2:B4", "B5:B7"),
+        ("A2:B2",),
+        ("A9:B12",),  # of nothing
+    ],
 )
 def test_a_merged_range_has_its_value_in_every_row(tmp_path: Path, ranges: tuple[str, ...]) -> None:
     expected = [*WHOLE, *BROKEN]
@@ -161,6 +168,14 @@ def test_hidden_rows_and_sheets_are_left_out_and_hidden_columns_read(tmp_path: P
     with pytest.raises(spi.IndicatorError, match="content in hidden sheets alone"):
         read_trials(workbook(tmp_path / "t.xlsx", WHOLE, hide_all))
 
+    def hide_six(sheet: Any) -> None:
+        for line in range(2, 8):
+            sheet.row_dimensions[line].hidden = True
+
+    trials = read_trials(workbook(tmp_path / "t.xlsx", [*WHOLE, *WHOLE, *WHOLE], hide_six))
+    assert conditions(trials) == WHOLE
+    assert "6 (rows 2, 3, 4, 5, 6, ..). Show" in trials.notes[0]
+
 
 def test_numbers_that_a_spreadsheet_rounds_are_no_seeds(tmp_path: Path) -> None:
     header = ("robots", "seed", "delivered")
@@ -199,6 +214,10 @@ def test_numbers_that_a_spreadsheet_rounds_are_no_seeds(tmp_path: Path) -> None:
         ("robots,seed,map,p\n4,0,hall,1\n4,1,,2\n", "line 3, column 'map': nothing: should be th"),
         ("policy,robots,p\nA,4,1\n=A2,4,2\n", "line 3, column 'policy': '=A2': should be a value"),
         ("trial,seed,robots,time\n1,0,4,2\n,0,4,3\n", "line 3, column 'trial': nothing: should"),
+        (
+            "robots,fault,faulty,p\n,none,0,1\n,FM1,1,2\n",
+            "line 3, column 'robots': nothing: should be the swarm's size, or R is undefined",
+        ),
     ],
 )
 def test_a_label_that_a_row_lacks_is_refused(tmp_path: Path, text: str, words: str) -> None:

@@ -11,6 +11,7 @@ from swarm_logistics_env import judge
 from swarm_logistics_env.spi import Phases
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.answer_notes import collapsed_in_words
+from swarm_logistics_env.study.report.tables import critical_size_in_words
 from swarm_logistics_env.study.verdicts.collapses import collapses, edges
 
 
@@ -80,6 +81,15 @@ def test_shares_of_collapsed_runs_have_exact_intervals_by_size() -> None:
     assert edge.size.value == pytest.approx(8.0)
     (edge_of_two,) = edges(judge(frame[frame.robots < 16]).cells)
     assert edge_of_two.shares == edge.shares[:2]
+
+
+def test_the_critical_size_is_said_with_its_interval() -> None:
+    good = [*range(90, 120)]
+    bad = [3, 4, 5, 6, 7] * 6
+    p = good * 2 + good[:15] + bad[:15] + bad * 2
+    frame = pd.DataFrame({"robots": np.repeat([10, 14, 20, 28, 40], 30), "P": p})
+    (edge,) = edges(judge(frame).cells)
+    assert critical_size_in_words(edge) == "Half of the runs collapse at N = 20 [17, 23]"
 
 
 def test_counts_too_small_for_phases_are_untestable_in_answer_and_table() -> None:

@@ -177,6 +177,14 @@ def test_a_judged_policy_without_a_match_fails_and_is_named() -> None:
         assert fails("change < 0 at random-walk", old, new)
 
 
+def test_conditions_of_one_study_alone_are_named() -> None:
+    old = results(WELL)
+    new = results(WELL, sizes=[])
+    words = "study, and not compared: swarm-dt, N = 20 (Scalability)."
+    assert match(old, new).notes == (f"Only in the old {words}",)
+    assert match(new, old).notes == (f"Only in the new {words}",)
+
+
 def test_what_cannot_be_judged_fails_and_a_gate_on_nothing_is_refused() -> None:
     old = results(WELL, scenario={"n_robots": 10, "n_items": 70})
     failed = judge(old.plan, {run_key: Outcome(error="x") for run_key in old.outcomes})

@@ -197,10 +197,19 @@ def test_a_change_within_the_margin_is_played_no_further() -> None:
 def test_stopped_before_the_first_look_it_has_a_value_of_every_question_and_no_verdict() -> None:
     study = until_clear(60)
     assert latest_look(study.plan(), {}).n_most == len(study.plan().runs)
-    study.run(Engine(most=35))
-    verdicts = verdicts_of(study)
-    assert {test.estimate and test.estimate.n_seeds for test in verdicts.values()} <= {8, 9}
-    assert {test.conclusion for test in verdicts.values()} == {"undefined"}
+    for most, n_seeds in ((13, {1}), (22, {8, 9})):  # one seed has no p
+        study.run(Engine(most=most))
+        verdicts = verdicts_of(study)
+        assert {test.estimate and test.estimate.n_seeds for test in verdicts.values()} <= n_seeds
+        assert {test.conclusion for test in verdicts.values()} == {"undefined"}
+
+
+def test_an_open_scalability_has_no_margin_to_stop_within() -> None:
+    study = Study(seeds=30, until_clear=True, sizes=[{"values": [20, 40]}], indicators=["S"])
+    counts = np.random.default_rng(0).poisson(40, (41, 30))  # by N and the seed
+    study.run(Engine(lambda run, _: delivered(counts[run.case.scenario.n_robots, run.seed])))
+    (verdict,) = study.findings().verdicts
+    assert (verdict.on_threshold.adjusted, verdict.given_up) == ("open", "hardly")
 
 
 @pytest.mark.daily
