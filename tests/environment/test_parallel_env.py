@@ -150,6 +150,13 @@ def test_wrong_arguments_are_refused(
         parallel_env(**arguments)
 
 
+def test_nothing_is_rendered_without_a_render_mode() -> None:
+    env = parallel_env(n_robots=2)
+    env.reset(seed=0)
+    with pytest.raises(SetupError, match='render_mode = None: should be "rgb_array" or "human"'):
+        env.render()
+
+
 def test_episodes_follow_from_the_last_seed_that_was_given_and_differ() -> None:
     def bits(env: SwarmLogisticsEnv, seed: int | None) -> bytes:
         return env.reset_arrays(seed).tobytes() + env.step_arrays(np.ones((3, 4)))[0].tobytes()

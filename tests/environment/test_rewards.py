@@ -245,6 +245,24 @@ AS_IN_NUMPY = {
 }  # fmt: skip
 
 
+def test_other_rewards_are_paid_from_the_next_step_on_and_wrong_ones_change_nothing() -> None:
+    size: Any = {"n_robots": 8, "warehouse_width": 3.0, "warehouse_height": 2.0, "n_items": 1}
+    env, contact = (
+        SwarmLogisticsEnv(**size, rewards=weights) for weights in (None, {"contact": -1.0})
+    )
+    for each in (env, contact):
+        each.reset_arrays(0)
+    commands = np.tile([1.0, 0.0, 0.1, 0.0], (8, 1))
+    for step in range(30):
+        paid, expected = (each.step_arrays(commands)[1] for each in (env, contact))
+        assert paid.tolist() == (expected if step >= 10 else np.zeros(8)).tolist()
+        if step == 9:
+            env.change_rewards({"contact": -1.0})
+            with pytest.raises(SetupError, match=r"rewards\['contact'\] = nan"):
+                env.change_rewards({"contact": math.nan})
+    assert expected.any()
+
+
 def test_the_compiled_terms_pay_to_the_bit_what_they_paid_in_numpy() -> None:
     """With several requests, orders in time and late, docks that are named, and failures."""
     small = Scenario(

@@ -97,6 +97,7 @@ def change(*arguments: Any, **options: Any) -> Make:
     [
         (fault(onset=[0.0, -1.0]), FaultError, "Fault.onset = -1.0"),
         (fault(onset="soon"), FaultError, "Fault.onset = 'soon'"),
+        (fault(onset=[]), FaultError, r"Fault.onset = \[\]: should list at least one time"),
         (lambda: fault(onset=lambda rng: -3.0)().reset(), FaultError, "Fault.onset = -3.0"),
         (fault(env=3), SetupError, "env = 3: should be a SwarmLogisticsEnv"),
         # A swarm too small for the fault, in either order.

@@ -105,6 +105,12 @@ def test_a_window_is_a_whole_number_of_episodes(window: Any) -> None:
         RunningMeans(window=window)
 
 
+@pytest.mark.parametrize("least", [0.0, -1, np.inf, np.nan, "8"])
+def test_what_a_divisor_is_at_least_is_a_positive_number_of_items(least: Any) -> None:
+    with pytest.raises(SetupError, match=f"least = {least!r}: should be a positive number of ite"):
+        RunningMeans(least=least)
+
+
 def test_means_that_are_not_there_yet_or_too_small() -> None:
     env = rewarded({"R": 1.0, "FT": 1.0}, RunningMeans(least=8.0))
     assert env.payments_of(FAULTY)["R"].share == 1 / 8

@@ -266,6 +266,9 @@ def test_what_cannot_be_judged_is_refused_at_the_reset() -> None:
         comparison("K", FAULTY, env.unwrapped.scenario)
     with pytest.raises(SetupError, match="n_removed = -1"):
         Condition(4, n_removed=-1)
+    for halves in ({"modes": ("FM1",)}, {"n_failed": 1}):
+        with pytest.raises(SetupError, match=r"modes = .*, n_failed = \d: should both be given"):
+            Condition(4, **halves)
     with pytest.raises(SetupError, match="window = 0"):
         RunningMeans(window=0)
 

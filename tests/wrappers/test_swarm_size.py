@@ -73,6 +73,11 @@ def test_who_leaves_terminates_and_is_gone_for_the_rest_of_the_episode() -> None
         ),
         ({"sizes": 9, "leave": [(4, -1.0)]}, FaultError, "Fault.onset = -1.0"),
         ({"sizes": 9, "leave": [4]}, SetupError, r"leave = \[4\]"),
+        (
+            {"sizes": 9, "leave": [(0, 1.0)]},
+            SetupError,
+            r"leave = \[\(0, .* at least one robot each",
+        ),
     ],
 )
 def test_wrong_arguments_are_refused_at_once(

@@ -201,9 +201,10 @@ def _draw_centres(scenario: Scenario, seed: int, discs: Discs, obstacles: Number
             is_room = strew(keys, centres, radius, high_x, high_y, obstacles, reach)
         if is_room:
             return centres
+    fewer = " or ".join(f"fewer {kind}" for kind in dict.fromkeys((discs.kind, "obstacles")))
     raise ScenarioError(
-        f"no room for {discs.n} {discs.kind} of radius {radius} m: should be fewer "
-        f"{discs.kind}, fewer obstacles or a larger warehouse"
+        f"no room for {discs.n} {discs.kind} of radius {radius} m: should be {fewer}, or a larger "
+        "warehouse"
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -50,6 +51,7 @@ SMALL = " ".join(f"--set {field}" for field in (*FIELDS, "delivery_width=1"))
         ("run --set floor=aisle", "rows of a plan; did you mean 'aisles'?"),
         ("list robots", "'robots' is not one of 'policies', 'trainings', 'faults', 'studies'"),
         ("study plan quick --policy nobody", "'nobody'"),
+        ("study plan quick --policy model.zip", "--policy model.zip: reading a model of stable"),
         ("study report nowhere", "no study in nowhere"),
     ],
 )
@@ -107,6 +109,32 @@ def test_fault_of_ours_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.delattr(Scenario, "conditions")
     with pytest.raises(AttributeError):
         app.run(["list", "scenario"])
+
+
+def test_who_stops_a_command_before_it_begins_hears_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys.modules[type(app).__module__], "command_line", stop)
+    assert app.run(["list", "scenario"]) == 130
+    assert capsys.readouterr().err == "swarm-logistics: stopped\n"
+
+
+def test_the_process_ends_with_its_commands_code_and_without_a_notebooks_backend(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    module = sys.modules[type(app).__module__]
+    monkeypatch.setattr(module, "prepare_output", lambda: None)
+    monkeypatch.setattr(module.gc, "freeze", lambda: None)
+    monkeypatch.setattr(sys, "argv", ["swarm-logistics", "list", "robots"])
+    monkeypatch.setenv("MPLBACKEND", "module://of_a_notebook")
+    with pytest.raises(SystemExit) as end:
+        app()
+    assert end.value.code == 2
+    assert "'robots' is not one of" in capsys.readouterr().err
+    assert "MPLBACKEND" not in os.environ
 
 
 def command_lines(command: Any, *names: str) -> Iterator[tuple[list[str], Any]]:
@@ -230,8 +258,9 @@ def test_no_number_is_cut_at_a_narrow_terminal(
     monkeypatch.setenv("FORCE_COLOR", "1")  # rich takes the output for a terminal
     monkeypatch.setenv("COLUMNS", "30")
     value = "123.4567[122.1234,125.9876]"
-    show(Section("P", ("policy", "P", "R"), (("swarm-dt-follow", value, value),)))
+    show(Section("P", ("policy", "P", "R"), (("swarm-dt-follow", value, value),), ("* [best]",)))
     printed = capsys.readouterr().out
+    assert "\n* [best]\n" in printed
     assert "…" not in printed
     for digits in "123456789":
         assert printed.count(digits) >= 2 * value.count(digits)

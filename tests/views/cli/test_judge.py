@@ -220,6 +220,7 @@ def test_the_same_trials_again_finish_a_judgement_that_was_interrupted(
         ("homing --seeds 2", "--seeds"),
         ("homing --benchmark --seeds 5", "same conditions for everybody"),
         ("homing-stock --benchmark", "is the benchmark's reference: its score is 1"),
+        ("homing swarm-dt --benchmark", "--benchmark: should be of one policy, not of 2"),
         ("homing --benchmark --first-seed 0", "--first-seed: the benchmark has the same"),
     ],
 )

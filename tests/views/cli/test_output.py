@@ -146,6 +146,23 @@ def test_on_windows_an_invalid_argument_means_that_nobody_reads(
     assert numbers == ([number] if is_raised else [])
 
 
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_whether_output_goes_to_a_terminal_stays_known(is_terminal: bool, tmp_path: Path) -> None:
+    class Screen(io.FileIO):
+        def isatty(self) -> bool:
+            return is_terminal
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(sys, "stdout", io.TextIOWrapper(Screen(tmp_path / "screen", "w")))
+        patched.setattr(sys, "stderr", None)  # as of a process without a console
+        prepare_output()
+        assert sys.stdout.isatty() is is_terminal
+        sys.stderr.write("lost →")
+        sys.stderr.flush()
+        sys.stdout.close()
+        sys.stderr.close()
+
+
 def test_output_that_cannot_be_written_is_still_told(folder: Path) -> None:
     if not Path("/dev/full").exists():
         pytest.skip("no device that is always full")

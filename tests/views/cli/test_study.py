@@ -22,6 +22,7 @@ from swarm_logistics_env.policies.catalogue import WEIGHTS
 from swarm_logistics_env.study.questions.presets import PRESETS
 from swarm_logistics_env.study.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.views.cli import app, study_commands
 from tests.conftest import figures_drawn
 from tests.views.cli.conftest import Command
 
@@ -172,6 +173,44 @@ def test_ctrl_c_stops_and_says_how_to_go_on(file: Path) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("options", "task", "out", "n_runs", "later"),
+    [
+        ("--seeds 3", "warehouse", "mine", 6, ""),
+        ("--seeds 3 --clearing", "clearing", "mine-clearing", 6, ""),
+        ("--until-clear", "warehouse", "mine", 400, ", and with what later looks need"),
+    ],
+)
+def test_what_is_left_of_a_study_that_is_stopped_is_told(
+    options: str,
+    task: str,
+    out: str,
+    n_runs: int,
+    later: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def stop(study: Study, *_: object, after_look: object, **__: object) -> None:
+        assert study.specification.task == task
+        assert (after_look is None) == (not later)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Study, "run", stop)
+    assert app.run(f"{RUN} {options}".split()) == 130
+    assert capsys.readouterr().err == (
+        f"\nStopped. 0 of {n_runs} runs are finished and kept in {Path('results', out)}; the same "
+        f"command goes on with the other {n_runs}{later}.\n"
+    )
+
+
+def test_a_pilot_is_played_of_tasks_with_items_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = Study(
+        task="tests.study.tasks.lane:LANE", policies=["walker"], sizes=[{"values": [2, 4]}]
+    )
+    monkeypatch.delattr(study_commands, "Run")
+    study_commands.say_what_a_pilot_shows(study)
+
+
 def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says_so(
     command: Command,
 ) -> None:
@@ -202,6 +241,8 @@ def test_options_of_run_change_the_study_and_failed_runs_its_exit_code(
     file.write_text(FILE.replace("n_items = 8, duration = 2", "n_items = 1, duration = 60"))
     printed = command(f"{RUN} --policy homing --seeds 1")
     assert "homing delivers every item before the end" in printed
+    printed = command(f"{RUN} --policy homing --seeds 1 --performance on_time --set order_due=60")
+    assert "homing has the largest P possible in a first run: most verdicts will be" in printed
     # It stands beside the study of the file's own policies.
     assert Path("results/mine-homing/report.html").exists()
     Path("broken_policy.py").write_text(BROKEN)

@@ -5,8 +5,13 @@ from __future__ import annotations
 import pytest
 
 from swarm_logistics_env import Scenario
+from swarm_logistics_env.core.errors import BodiesError, StudyError
 from swarm_logistics_env.study.studies import Study
-from swarm_logistics_env.views.cli.study_choice import ask_in_world
+from swarm_logistics_env.views.cli.study_choice import (
+    ask_in_world,
+    change_scenario,
+    switch_to_clearing,
+)
 
 
 @pytest.mark.parametrize(
@@ -44,3 +49,33 @@ def test_values_of_a_parameter_follow_from_its_value_there() -> None:
     assert after["delivery_width"] == (1.0, 0.5)
     ask_in_world(study, Scenario(floor="aisles"))
     assert study.specification.parameters == ()
+
+
+def test_a_floor_plan_takes_the_questions_of_sizes_out_of_a_study_and_says_so(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    study = Study.preset("scorecard")
+    change_scenario(study, {"floor": None})
+    names = [parameter.name for parameter in study.specification.parameters]
+    assert names == ["delivery_width"]
+    assert capsys.readouterr().out == ""
+    change_scenario(study, {"floor": "aisles"})
+    assert study.specification.parameters == ()
+    assert isinstance(study.specification.scenario, Scenario)
+    assert study.specification.scenario.floor == "aisles"
+    text = "No question of delivery_width, which follows from the floor plan.\n"
+    assert capsys.readouterr().out == text
+
+
+def test_bodies_that_there_are_not_are_refused_before_a_study_has_them() -> None:
+    study = Study.preset("scorecard")
+    before = study.specification
+    with pytest.raises(BodiesError, match="did you mean 'mujoco'"):
+        ask_in_world(study, Scenario(bodies="mujoko"))
+    assert study.specification is before
+
+
+def test_no_rate_of_clearing_is_asked_of_another_task() -> None:
+    study = Study(task="tests.study.tasks.lane:LANE", policies=["walker"])
+    with pytest.raises(StudyError, match=r"for the task 'warehouse', not 'tests\.study"):
+        switch_to_clearing(study)

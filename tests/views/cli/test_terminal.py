@@ -12,6 +12,7 @@ from rich.console import Console
 
 from swarm_logistics_env.core.progress_bar import clock
 from swarm_logistics_env.study.report.document import Document, document
+from swarm_logistics_env.study.runs.engines import Tally
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.verdicts.results import StudyResults, judge
 from swarm_logistics_env.views.cli import terminal
@@ -60,6 +61,45 @@ def test_terminal_pipe_and_file_have_the_same_content_and_no_row_is_folded(
             # A narrow terminal has room for the ends of a question alone.
             question = line.question if width in (120, None) else line.question.partition(" ")[0]
             assert any(row.startswith(question) for row in shown), line
+
+
+def test_at_a_terminal_text_is_folded_and_a_command_stands_whole_on_its_own_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text, command = "More seeds, which nobody has seen:", "judge homing --out mine-40"
+    printed = {
+        None: f"{text} {command}\nAn end.\n",
+        20: f"More seeds, which\nnobody has seen:\n{command}\nAn end.\n",
+    }
+    for width, expected in printed.items():
+        monkeypatch.setattr(terminal, "Console", console_of(width))
+        terminal.say(text, command)
+        terminal.say("An end.")
+        assert capsys.readouterr().out == expected
+
+
+def test_where_figures_cannot_be_drawn_it_says_what_to_install_instead_of_where_they_are(
+    documents: list[tuple[StudyResults, Document]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(terminal, "document", lambda _: documents[0][1])
+    monkeypatch.setattr(terminal, "write_document", lambda *_: [tmp_path])
+    monkeypatch.setattr(terminal, "how_to_get_figures", lambda: "Install pens.")
+    terminal.show_report(documents[0][0], tmp_path, full=False)
+    assert capsys.readouterr().out.endswith(f"\nReport: {tmp_path}\nInstall pens.\n")
+
+
+def test_why_stored_runs_do_not_count_is_told_before_what_was_played(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    terminal.say_what_was_played(Tally(4, 0, 1, 2.0, changes=("the code is new", "so is numpy")))
+    assert capsys.readouterr().out.splitlines() == [
+        "Runs that were stored before do not count: the code is new.",
+        "Runs that were stored before do not count: so is numpy.",
+        "4 runs played in 2.0 s, 2.00 episodes/s; 1 were kept from before; 0 failed",
+    ]
 
 
 def test_how_long_the_rest_takes_is_told_and_of_a_slow_policy_what_fewer_seeds_would_tell() -> None:

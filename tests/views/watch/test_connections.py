@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import errno
 import socket
 import time
+from typing import Any
 
 import pytest
 
@@ -71,6 +74,26 @@ def test_connections_that_neither_read_nor_answer_end_and_shut_nobody_out(
         for connection in waiting:
             connection.close()
     assert len(capfd.readouterr().err) < 1000
+
+
+def test_a_connection_that_cannot_be_accepted_shuts_no_other_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    accept = asyncio.SelectorEventLoop.sock_accept
+    refusals = [OSError(errno.EMFILE, "too many open files")] * 2
+
+    async def accept_the_third(loop: Any, listening: socket.socket) -> Any:
+        if refusals:
+            raise refusals.pop()
+        return await accept(loop, listening)
+
+    monkeypatch.setattr(asyncio.SelectorEventLoop, "sock_accept", accept_the_third)
+    served = Served()
+    try:
+        assert ask(served, "")[0] == 200
+    finally:
+        served.stop()
+    assert refusals == []
 
 
 def test_of_pages_that_open_in_one_moment_all_are_answered(

@@ -48,6 +48,14 @@ def test_page_and_scripts_come_with_a_content_policy(shared: Served) -> None:
         }
 
 
+def test_what_was_played_is_saved_as_a_page_of_its_own(shared: Served) -> None:
+    status, body, headers = ask(shared, "recording.html")
+    assert status == 200
+    assert headers["Content-Type"].startswith("text/html")
+    assert headers["Content-Disposition"] == 'attachment; filename="run.html"'
+    assert b'id="recording"' in body
+
+
 @pytest.mark.parametrize(
     "headers",
     [

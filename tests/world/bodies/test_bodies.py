@@ -14,7 +14,7 @@ import pytest
 
 from swarm_logistics_env import Scenario, Warehouse, run_episode
 from swarm_logistics_env.adapters import SwarmVecEnv
-from swarm_logistics_env.core.errors import BodiesError, SetupError
+from swarm_logistics_env.core.errors import BodiesError, CommandError, SetupError
 from swarm_logistics_env.policies import load
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.world.bodies import Orders, Placement, Poses, load_bodies
@@ -141,6 +141,15 @@ def test_a_robot_that_handles_an_item_or_is_dead_is_ordered_to_stand() -> None:
     has_moved = (world.state.robot_position != start).any(axis=1)
     assert not has_moved[dead]
     assert has_moved.sum() == 2
+
+
+def test_a_command_that_is_not_finite_is_refused_before_the_bodies_hear_of_it() -> None:
+    world = Warehouse(scenario("Breaks"))  # at the third order
+    world.reset(seed=0)
+    for _ in range(3):
+        with pytest.raises(CommandError, match=r"commands\[1, 2\] = inf"):
+            world.step([[0.0] * 4, [0.0, 0.0, np.inf, 0.0], [0.0] * 4])
+    assert world.state.step == 0
 
 
 def test_a_lost_robot_leaves_the_arena_and_its_item_stays() -> None:

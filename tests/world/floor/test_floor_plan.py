@@ -79,6 +79,8 @@ def test_sizes_follow_from_the_plan_and_are_refused_otherwise() -> None:
         ("A:\t:\nA:::", "line 1, column 3: '\\t' is no cell"),
         ("A:a:\nA:::", "line 1, column 3: 'a' is no cell"),
         ("####\n####", "the plan has no dock (a letter from A to Z)"),
+        ("\n", "the plan is empty: should have at least one cell"),
+        ("a" * 5_000, "should be a shipped plan, a file, or rows of a plan"),  # no path is so long
     ],
 )
 def test_an_error_names_line_and_column(text: str, message: str) -> None:
@@ -92,6 +94,8 @@ def test_an_error_names_line_and_column(text: str, message: str) -> None:
 def test_cells_thinner_than_a_robot_are_refused() -> None:
     with pytest.raises(ScenarioError, match="should be at least a robot's radius"):
         Scenario(floor="aisles", cell_size=0.1)
+    with pytest.raises(ScenarioError, match=r"Scenario.cell_size = 'wide': should be a number"):
+        planned("aisles", cell_size="wide")
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Scenario, Warehouse
 from swarm_logistics_env.world.rendering import Renderer, palette
 from swarm_logistics_env.world.rendering.plan_shapes import plan_shapes
+from swarm_logistics_env.world.warehouse.structs import NOBODY
 
 if TYPE_CHECKING:
     from pygame import Surface
@@ -123,8 +124,12 @@ def test_a_request_shows_the_letter_of_its_dock() -> None:
         )
         assert (picture == colour).all(axis=2).sum() > 15
         assert share(picture, colour_of_other) == 0.0
-    any_dock = floor_of(world_of())[CELL * 3 : CELL * 7, CELL * 2 : CELL * 6]
-    assert not any(share(any_dock, palette.dock_colours(hue)[2]) for hue in palette.DOCK_HUES)
+    pictures = [floor_of(world_of())]
+    world.state.requested_docks[:] = NOBODY
+    pictures.append(floor_of(world))
+    for picture in pictures:
+        any_dock = picture[CELL * 3 : CELL * 7, CELL * 2 : CELL * 6]
+        assert not any(share(any_dock, palette.dock_colours(hue)[2]) for hue in palette.DOCK_HUES)
 
 
 def test_shapes_cover_each_cell_of_their_kind_once() -> None:

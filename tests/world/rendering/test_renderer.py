@@ -123,7 +123,7 @@ def small_hall() -> Frame:
     return hall(130)
 
 
-def yard() -> Frame:
+def yard(size: int = 500) -> Frame:
     """Batteries, a station that is broken, kinds of robots, orders with a due time, one late."""
     kinds = "lifter:2, scout:1 robot_radius=0.2, third:1, fourth:1"
     scenario = Scenario.preset("day").replace(
@@ -140,10 +140,15 @@ def yard() -> Frame:
     state.open_requests[:2] = 0, 1
     state.orders.open[:2, DUE] = 5.0, 500.0
     state.progress.time[0] = 12.3
-    return frame(state, scenario, 500)
+    return frame(state, scenario, size)
 
 
-@pytest.mark.parametrize("scene", [room, hall, small_hall, yard])
+def small_yard() -> Frame:
+    """The same with lines and marks as small as they are drawn."""
+    return yard(130)
+
+
+@pytest.mark.parametrize("scene", [room, hall, small_hall, yard, small_yard])
 def test_pictures_are_as_recorded(scene: Callable[[], Frame], tmp_path: Path) -> None:
     """To every bit with the recorded version of pygame; other ones draw letters otherwise."""
     import pygame
@@ -344,6 +349,20 @@ def test_no_display_is_a_typed_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "no such driver")
     with pytest.raises(SetupError, match=r"needs a display .* 'rgb_array'"):
         Renderer(ONE[1], "human", 300).show(*ONE)
+
+
+@pytest.mark.usefixtures("dummy_display")
+def test_a_display_that_shows_nothing_is_refused_unless_it_was_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    import pygame
+
+    monkeypatch.setattr(pygame.display, "get_driver", lambda: "offscreen")
+    Renderer(ONE[1], "human", 300).show(*ONE)  # SDL_VIDEODRIVER names a driver
+    monkeypatch.delenv("SDL_VIDEODRIVER")
+    with pytest.raises(SetupError, match=r"needs a display \(SDL found none\)"):
+        Renderer(ONE[1], "human", 300).show(*ONE)
+    assert not pygame.display.get_init()
 
 
 def test_wrong_arguments_and_a_missing_pygame_are_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -114,6 +114,10 @@ def test_a_robot_drives_until_its_battery_is_empty(build: Build) -> None:
     [
         ({"dead_stations": 1}, "dead_stations = 1: should have batteries"),
         ({"n_stations": 1}, "n_stations = 1: should have batteries"),
+        (
+            {"robot_kinds": [{"name": "scout", "count": 1, "battery": 500.0}]},
+            "battery = 500 of the kind 'scout': should stand beside the scenario's battery",
+        ),
         ({"battery": 5000.0, "dead_stations": 5}, "dead_stations = 5: should be at most 4"),
         ({"battery": 50.0}, r"battery = 50 J .* a robot the 9.8 m .* at least 123 J"),
         ({"battery": 5000.0, "floor": "A::\n:::"}, r'the plan has no charging station \("\*"\)'),

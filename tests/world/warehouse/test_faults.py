@@ -108,6 +108,16 @@ def test_what_does_not_read_so_is_refused_with_the_form(text: str) -> None:
     assert fault_of("FM4@.5") == Fault("FM4", onset=0.5)  # parts may be left out
 
 
+@pytest.mark.parametrize(
+    ("text", "remedy"), [("late:2@100", r"late:2@0\+100"), ("late@.5", r"late:1@0\+.5")]
+)
+def test_late_robots_without_a_duration_are_refused_with_the_text_that_was_meant(
+    text: str, remedy: str
+) -> None:
+    with pytest.raises(FaultError, match=f"begin when it ends: should be {remedy}"):
+        fault_of(text)
+
+
 # -- what is lost -------------------------------------------------------------------------------
 
 

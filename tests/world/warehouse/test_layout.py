@@ -113,6 +113,13 @@ def test_a_restocked_item_stands_clear_and_each_elsewhere() -> None:
     assert len(np.unique(places, axis=0)) == 29
 
 
+def test_an_obstacle_that_would_close_the_only_way_finds_no_room() -> None:
+    size: Any = {"n_robots": 1, "n_items": 1, "n_obstacles": 1, "obstacle_radius": 0.1}
+    world = Warehouse(Scenario(floor="A::", **size))
+    with pytest.raises(ScenarioError, match="be fewer obstacles, or a larger"):
+        world.reset(0)
+
+
 def test_where_nothing_fits_any_more_it_says_what_would_help(build: Build) -> None:
     world = build(
         [(0.6, 0.6)], [(0.65, 0.6)], warehouse_width=1.2, warehouse_height=1.2, delivery_width=0.6,

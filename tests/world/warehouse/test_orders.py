@@ -325,6 +325,8 @@ BAD_ORDERS: dict[str, str] = {
     file_of("0,7,,", "1,7,,"): "line 3: item = 7 is ordered in line 2 already",
     file_of("0,1,A", header="time,item,dock"): "line 2: dock = 'A': should be empty",
     file_of(*["0,A,,"] * 60, "9,7,,"): "item = 'A' is ordered 60 times: there are 59 items",
+    "time,item\n0,A/B": r"a row has the sign '/': should have none",
+    file_of("0,1,2", header="time,item,time"): "line 1: column 'time' stands there twice",
     "time,item/": "0 orders: should be 1 to 100000",
 }
 
