@@ -97,6 +97,9 @@ def test_a_seed_fixes_all_episodes_and_no_seed_none() -> None:
     assert seeds[0] == seeds[2] != seeds[3]
     np.testing.assert_equal(played(env, 45), trace)
     assert not np.array_equal(worlds(2, seed=None).reset(), trace[0])
+    unknown = env.seed()
+    assert unknown[0] == unknown[2] != unknown[3]
+    assert env.seed() != unknown
 
 
 def test_all_delivered_is_no_time_limit_and_nobody_left_ends_a_world() -> None:
@@ -113,6 +116,16 @@ def test_all_delivered_is_no_time_limit_and_nobody_left_ends_a_world() -> None:
     env.reset()
     ends = [env.step(np.zeros((3, 4)))[2].all() for _ in range(4)]
     assert ends == [False, True, False, True]
+
+
+def test_an_info_says_whether_its_robot_is_away() -> None:
+    env = worlds(1, faults=[Fault("away", (1,), onset=0.1, duration=0.2)])
+    env.reset()
+    away = []
+    for _ in range(5):
+        *_, infos = env.step(np.zeros((3, 4)))
+        away.append([info["away"] for info in infos])
+    assert away == [[0, 1, 0], [0, 1, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]
 
 
 def test_infos_that_are_written_into_share_nothing() -> None:

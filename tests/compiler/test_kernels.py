@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import importlib
 import os
 import shutil
 import subprocess
@@ -161,6 +162,47 @@ def test_compiling_tells_a_person_once_and_never_from_a_worker(tmp_path: Path) -
     assert message == "Compiling, which later runs reuse: up to 15 s of a free core.\n"
     assert finished(started(LONG, tmp_path))[-1] == ""  # loaded
     assert finished(quiet)[-1] == ""
+
+
+def test_at_a_terminal_a_bar_shows_how_many_kernels_are_compiled(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv(numba_fence.QUIET, raising=False)
+    monkeypatch.setattr(fast_kernels, "_SILENCE", 0.0)
+    monkeypatch.setattr(fast_kernels._Report, "is_told", False)
+    monkeypatch.setattr(fast_kernels._Report, "bar", None)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    for variable, value in {"TERM": "xterm", "COLUMNS": "80"}.items():
+        monkeypatch.setenv(variable, value)
+
+    half = kernels.kernel(lambda number: number / 2.0)
+    third = kernels.kernel(lambda number: number / 3.0)
+    sixth = kernels.kernel(lambda number: third(half(number)))
+    assert sixth(3.0) == 0.5
+    shown = capsys.readouterr().err
+    assert shown.count("up to 15 s of a free core.\n") == 1
+    assert "%" in shown
+    bar = fast_kernels._Report.bar
+    assert bar is not None
+    assert not bar.live.is_started
+    n_done = sum(bool(kernel.overloads) for kernel in fast_kernels._all_kernels)
+    [task] = bar.tasks
+    # Of the outer one nothing is told, as it is the last.
+    assert (task.completed, task.total) == (n_done - 1, len(fast_kernels._all_kernels))
+
+
+def test_numbas_functions_of_arrays_are_imported_without_scipys_blas(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    blas = "scipy.linalg.cython_blas"
+    imported = []
+    monkeypatch.delitem(sys.modules, blas, raising=False)
+    monkeypatch.setattr(
+        importlib, "import_module", lambda name: imported.append((name, blas in sys.modules))
+    )
+    fast_kernels._import_without_blas.__wrapped__()
+    assert imported == [("numba.np.arraymath", True)]
+    assert blas not in sys.modules
 
 
 def test_what_is_kept_is_used_until_a_file_of_kernels_changes(

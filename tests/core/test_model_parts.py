@@ -21,6 +21,7 @@ import pytest
 from swarm_logistics_env import policies
 from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.core.fingerprint import UNSTABLE, deep_copy, fingerprint
+from swarm_logistics_env.core.model_parts import model_parts
 from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.study.runs.notes import merge
 from swarm_logistics_env.study.studies import Study
@@ -64,6 +65,10 @@ class Scaling(nn.Module):  # type: ignore[misc, name-defined]
 
     def forward(self, weight: Any) -> Any:
         return self.gain * weight
+
+
+class Tagged(torch.Tensor):  # type: ignore[misc, name-defined]
+    """A tensor of a kind of its own."""
 
 
 @dataclass
@@ -152,6 +157,9 @@ CASES: dict[str, tuple[Callable[[Any], Any], Any, Any]] = {
     "traced": (lambda functions: traced(0, *functions), [torch.tanh, torch.relu],
                [torch.relu, torch.tanh]),
     "compiled": (lambda part: torch.compile(Holding(part), backend="eager"), 0.5, 1.0),
+    "compiled function": (lambda f: torch.compile(f, backend="eager"), lambda x: x, lambda x: -x),
+    "compiler": (lambda backend: torch.compile(apply, backend=backend), "eager", "aot_eager"),
+    "subclass of tensors": (lambda x: Holding(torch.full((3,), x).as_subclass(Tagged)), 0.0, 1.0),
     "graph": (lambda kind: torch.fx.symbolic_trace(nn.Sequential(linear(), kind())), nn.Tanh,
               nn.ReLU),
 }  # fmt: skip
@@ -237,6 +245,15 @@ def test_a_session_that_draws_numbers_has_no_stable_value(tmp_path: Path) -> Non
     onnx.save(model, tmp_path / "drawing.onnx")
     session = runtime.InferenceSession(tmp_path / "drawing.onnx")
     assert value_of(session).startswith(UNSTABLE)
+    for argument in (x, y):
+        argument.type.tensor_type.elem_type = onnx.TensorProto.DOUBLE
+    model = onnx.helper.make_model(
+        onnx.helper.make_graph([make_node("Neg", ["x"], ["y"])], "doubles", [x], [y]),
+        opset_imports=operators, ir_version=8,
+    )  # fmt: skip
+    doubles = runtime.InferenceSession(model.SerializeToString())
+    with pytest.raises(TypeError, match=r"input x of tensor\(double\): cannot be drawn"):
+        model_parts(doubles)
 
 
 def test_a_model_of_stable_baselines3_is_what_it_predicts_with(tmp_path: Path) -> None:
@@ -250,6 +267,22 @@ def test_a_model_of_stable_baselines3_is_what_it_predicts_with(tmp_path: Path) -
     assert value_of(Data(again)) == before
     again.policy.action_space.high[:] = 0.5
     assert value_of(Data(again)) != before
+    again.lock = threading.Lock()  # so that it cannot be copied
+    assert deep_copy([again]) == [again]
+
+
+def test_what_was_computed_with_a_gradient_is_copied_without() -> None:
+    network = linear()
+    network.computed = 2.0 * network.weight
+    copied = deep_copy(network)
+    assert (copied.computed == network.computed).all()
+    assert not copied.computed.requires_grad
+    assert copied.weight.requires_grad
+    copied.computed += 1.0
+    copied.weight.data += 1.0
+    assert (network.computed == 2.0 * network.weight).all()
+    with pytest.raises(TypeError, match="lock"):
+        deep_copy([network, threading.Lock()])
 
 
 def test_a_policy_that_learned_after_its_plan_is_refused_and_then_played_anew(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import importlib
+import runpy
 import subprocess
 import sys
 
 import pytest
 
 import swarm_logistics_env
-from swarm_logistics_env import spi
+from swarm_logistics_env import adapters, spi
 from swarm_logistics_env.core.moved_names import MOVED, PACKAGE, name_today
 
 
@@ -50,6 +51,16 @@ def test_what_never_was_is_an_attribute_error() -> None:
         assert not hasattr(module, "no_such_name")
     with pytest.warns(DeprecationWarning, match="warehouse"), pytest.raises(ModuleNotFoundError):
         importlib.import_module("swarm_logistics_env.warehouse.no_such_name")
+
+
+def test_a_module_runs_under_its_former_name_as_python_m_runs_it() -> None:
+    members = runpy.run_module(f"{PACKAGE}.errors")
+    assert members["suggest"]("homin", ["homing"]) == "; did you mean 'homing'?"
+
+
+def test_the_package_lists_what_it_offers() -> None:
+    assert set(dir(swarm_logistics_env)) == {*swarm_logistics_env.__all__, "__version__"}
+    assert dir(adapters) == sorted(adapters.__all__)
 
 
 @pytest.mark.daily

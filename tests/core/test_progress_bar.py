@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import sys
+from types import SimpleNamespace
+
 import pytest
 from rich.console import Console
 
@@ -42,3 +45,22 @@ def test_a_bar_tells_what_is_done(capsys: Captured, monkeypatch: pytest.MonkeyPa
     text = shown(capsys, 8, 8)
     assert any("mine" in line and "8 of 8 runs" in line for line in text.splitlines())
     assert shown(capsys, 0, 0) == ""  # nothing to do
+
+
+def test_in_a_notebook_a_cell_shows_the_bar(
+    capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("tqdm")
+    shell = type("ZMQInteractiveShell", (), {})
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=shell))
+    with ProgressBar("mine", 4, "runs", done=1) as progress:
+        progress.reach(2)
+        progress.extend(8)
+        progress.reach(5)
+        progress.reach(7)
+    _, first, *_, last = capsys.readouterr().err.split("\r")
+    assert first.startswith("mine:  25%")
+    assert " 1/4 [" in first
+    assert " 7/8 [" in last
+    assert "runs/s" in last
+    assert last.endswith("\n")  # it is closed

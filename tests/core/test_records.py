@@ -87,6 +87,13 @@ def test_a_table_is_read_as_editors_save_it_or_told_how_to_save(name: str, tmp_p
             read_table(file, "lamp", PolicyError)
 
 
+def test_a_file_that_holds_a_list_is_no_table(tmp_path: Path) -> None:
+    file = tmp_path / "lamps.json"
+    file.write_text('[{"name": "a"}]')
+    with pytest.raises(PolicyError, match=r"^the lamp .*json should hold a table of fields$"):
+        read_table(file, "lamp", PolicyError)
+
+
 WRITE = """
 import sys
 from pathlib import Path

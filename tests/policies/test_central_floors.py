@@ -94,6 +94,16 @@ def test_more_robots_than_places_to_rest_share_them() -> None:
     assert ground_of(scenario).resting_places(30).shape == (30, 2)
 
 
+def test_where_no_cell_is_clear_of_walls_robots_rest_far_from_the_docks_all_the_same() -> None:
+    corridor = "#####\nA..::\n#####"
+    scenario = Scenario(floor=corridor, robot_radius=0.2, n_robots=1, n_items=1)
+    places = ground_of(scenario).resting_places(2)
+    floor = floor_map(scenario)
+    assert floor.is_free(places).all()
+    assert (floor.along(places) < 0.0).all()
+    assert np.linalg.norm(places[0] - places[1]) > 0.5
+
+
 def test_ways_lead_around_racks_and_obstacles() -> None:
     world, _ = begun("central", floor="aisles", n_obstacles=2)
     ground = ground_of(world.scenario)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -70,13 +72,21 @@ def test_what_cannot_go_to_charge_is_refused() -> None:
 
 
 def test_a_robot_that_needs_charge_lets_go_of_what_nobody_asks_for() -> None:
-    policy = policies.load("homing+charging")
+    policy: Any = policies.load("homing+charging")
     start(policy, DAY.replace(n_robots=2), 0)
     rows = np.array(Warehouse(DAY.replace(n_robots=2)).reset(0))
     rows[:, row.CARRYING] = 1.0
     rows[1, row.CARRYING_REQUESTED] = 1.0
     rows[:, len(rows[0]) - row.N_BATTERY_COLUMNS] = 0.1
     assert policy.act(rows)[:, 3].tolist() == [-1.0, 0.0]
+    rows[1, len(rows[0]) - row.N_BATTERY_COLUMNS] = 1.0
+    policy.act(rows)
+    memories = policy.memories()
+    assert memories["needs_charge"].tolist() == [True, False]
+    assert memories["side"].tolist() == [1.0, 1.0]
+    assert not memories["was_inside"].any()
+    assert not memories["in_vain"].any()
+    assert memories.keys() > policy.policy.memories().keys()
 
 
 def test_a_robot_leaves_a_station_that_does_not_charge_it() -> None:

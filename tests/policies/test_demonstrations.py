@@ -95,6 +95,11 @@ def test_imitation_learning_takes_the_transitions() -> None:
     np.testing.assert_array_equal(observations[1], following[0])
 
 
+def test_a_robot_that_is_never_there_has_no_episode() -> None:
+    recorded = record(HOMING, 1, scenario=SMALL.replace(duration=1.0), faults=["removed:1@0"])
+    assert [robot.robot for robot in recorded.episodes] == [1, 2, 3]
+
+
 def test_a_policy_that_sees_more_than_rows_is_refused() -> None:
     with pytest.raises(SetupError, match="policy 'central' has needs_state: should decide by"):
         record("central")

@@ -199,6 +199,12 @@ class Eastward:
         return np.stack([rows[:, -1] < 3.0, *np.zeros((3, len(rows)))], axis=1)
 
 
+def test_a_policy_within_wrappers_knows_the_scenario() -> None:
+    driver = Eastward()
+    policies.within(driver, Beacon).configure(BRIEF)
+    assert driver.scenario == BRIEF
+
+
 @pytest.mark.daily
 def test_a_policy_with_a_sensor_of_its_own_is_judged_as_any_other(tmp_path: Path) -> None:
     driver = Eastward()

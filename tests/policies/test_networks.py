@@ -6,7 +6,7 @@ import copy
 import pickle
 import warnings
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -138,6 +138,16 @@ class Giving(torch.nn.Module):  # type: ignore[misc, name-defined]  # as above
         return self.form(self.network(rows))
 
 
+class Judged(NamedTuple):
+    value: Any
+    action: Any
+
+
+class Spread(NamedTuple):
+    mean: Any
+    deviation: Any
+
+
 @pytest.mark.parametrize(
     "form",
     [
@@ -145,6 +155,9 @@ class Giving(torch.nn.Module):  # type: ignore[misc, name-defined]  # as above
         lambda actions: [actions, actions[:, :1]],
         lambda actions: {"mean": actions},
         lambda actions: {"value": actions[:, :1], "action": actions},
+        lambda actions: Judged(value=actions[:, :1], action=actions),
+        lambda actions: Spread(mean=actions, deviation=actions[:, :1]),
+        lambda actions: actions.tolist(),
     ],
 )
 def test_the_first_output_or_the_one_called_action_is_played(form: Any) -> None:
@@ -285,6 +298,12 @@ def test_a_session_that_takes_something_else_is_refused(
 ) -> None:
     with pytest.raises(PolicyError, match=sentence):
         policies.of(session(**arguments), frame=frame)
+
+
+def test_a_session_refuses_rows_of_another_length_than_its_file_says() -> None:
+    policy = policies.of(session(["n", N_COLUMNS]))
+    with pytest.raises(PolicyError, match="reads rows of 141 numbers, and these have 143"):
+        policy.act(np.pad(ROWS, ((0, 0), (0, 2))))
 
 
 def test_within_wrappers_a_network_is_tried_with_the_first_rows() -> None:

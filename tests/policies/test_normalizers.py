@@ -50,6 +50,9 @@ def test_rows_of_zeros_stay_zeros_and_statistics_go_on_with_their_training() -> 
     assert (policy.act(np.zeros((2, N_COLUMNS), np.float32)) == 0.0).all()
     normalize.obs_rms.mean = np.full(N_COLUMNS, 6.0)
     assert (policy.act(np.full((2, N_COLUMNS), 6.0, np.float32)) == 0.0).all()
+    sentence = r"its statistics have shape \(141,\), and rows here \(143,\): should be of the rows"
+    with pytest.raises(PolicyError, match=sentence):
+        policy.act(np.full((2, N_COLUMNS + 2), 6.0, np.float32))
 
 
 def test_a_policy_is_known_by_its_statistics_and_their_limit() -> None:

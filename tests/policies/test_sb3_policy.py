@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib
+import json
 import sys
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -101,6 +103,24 @@ def test_what_is_no_model_or_one_of_other_spaces_is_refused(model: Path, tmp_pat
             policies.load(str(path), trust_code=True, frame=frame)
     with pytest.raises(PolicyError, match="executes the code in it"):
         policies.from_sb3(model)
+    data = {"policy_class": {"__module__": "sb3_contrib.common.recurrent.policies"}}
+    with zipfile.ZipFile(broken, "w") as archive:
+        archive.writestr("data", json.dumps(data))
+    with pytest.raises(PolicyError, match=r"broken\.zip is recurrent: should have no memory"):
+        policies.from_sb3(broken, trust_code=True)
+
+
+def test_a_model_of_wrappers_is_read_within_them(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "wrappers_of_model.py").write_text("def wrap(env):\n    return env\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    policy: Any = policies.load(str(model), trust_code=True, env="wrappers_of_model:wrap")
+    assert policy.wrap.__name__ == "wrap"
+    rows = np.random.default_rng(0).normal(size=(4, N_COLUMNS)).astype(np.float32)
+    policy.reset(4, 0)
+    alone = policies.from_sb3(model, trust_code=True)
+    np.testing.assert_array_equal(policy.act(rows), alone.act(rows))
 
 
 @pytest.mark.daily
@@ -219,7 +239,7 @@ def test_a_policy_class_of_ones_own_is_read_by_its_algorithm(
 
 
 def test_actions_of_another_environment_are_refused(tmp_path: Path) -> None:
-    from gymnasium.spaces import Box, Discrete
+    from gymnasium.spaces import Box, Dict, Discrete
     from stable_baselines3 import PPO
 
     env = SwarmVecEnv(n_worlds=1, n_robots=2)
@@ -228,6 +248,9 @@ def test_actions_of_another_environment_are_refused(tmp_path: Path) -> None:
         learned.policy.action_space = space
         with pytest.raises(PolicyError, match=r"maps observations \(141,\) to .*: should map"):
             policies.of(learned)
+    learned.policy.action_space = Dict({"drive": space})
+    with pytest.raises(PolicyError, match=r"to Dict\(.*: should map a row of observations, in one"):
+        policies.of(learned)
 
 
 def test_statistics_that_normalize_no_rows_leave_them(model: Path, tmp_path: Path) -> None:

@@ -8,7 +8,8 @@ import pytest
 
 from swarm_logistics_env import Scenario, Warehouse, run_episode
 from swarm_logistics_env.core.errors import PolicyError
-from swarm_logistics_env.policies import NAMES, Policy, load
+from swarm_logistics_env.policies import NAMES, Policy, PolicySpec, load
+from swarm_logistics_env.policies.catalogue import ENTRY_POINTS
 from swarm_logistics_env.world.observations import N_COLUMNS
 
 
@@ -51,6 +52,43 @@ def test_what_is_no_policy_is_refused_with_the_reason(
 ) -> None:
     with pytest.raises(PolicyError, match=complaint):
         load(name, **parameters)  # type: ignore[arg-type]  # none of them is called trust_code
+
+
+@pytest.mark.parametrize(
+    ("table", "complaint"),
+    [
+        ({"name": "homing", "made": 3}, "'made' is no field of a table"),
+        ({"name": "homing", "trusted": True}, "'trusted' is no field of a table"),
+        *(
+            ({"name": "homing", "parameters": {name: True}}, f"'{name}' is no parameter of a poli")
+            for name in ("name", "trust_code", "trusted")
+        ),
+    ],
+)
+def test_a_table_of_a_file_says_neither_what_to_trust_nor_what_is_made(
+    table: dict[str, Any], complaint: str
+) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        PolicySpec.of(table)
+
+
+def test_an_object_is_refused_once_the_file_of_its_class_has_changed(own_module: Path) -> None:
+    spec = PolicySpec.of(load("own_policies:Still"))
+    planned = spec.identity()
+    assert spec.load(planned=planned).act(np.zeros((1, N_COLUMNS), np.float32))[0, 3] == 1.0
+    own_module.write_text(own_module.read_text() + "SPEED = 2\n")
+    sentence = "policy 'Still' is not what was planned: own_policies.py changed; start the study"
+    with pytest.raises(PolicyError, match=sentence):
+        spec.load(planned=planned)
+
+
+def test_an_installed_package_may_offer_policies_by_name(own_module: Path) -> None:
+    about = own_module.with_name("own-1.0.dist-info")
+    about.mkdir()
+    (about / "METADATA").write_text("Name: own\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(f"[{ENTRY_POINTS}]\nstill = own_policies:Still\n")
+    policy = load("still", gripper=0.25)
+    assert policy.act(np.zeros((2, N_COLUMNS), np.float32))[0, 3] == 0.25
 
 
 def fresh(name: str, n_robots: int) -> Any:

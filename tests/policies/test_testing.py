@@ -31,6 +31,14 @@ class Forgetful(SwarmDT):
         super().reset(n_robots, seed + self.episodes)
 
 
+class Counted(SwarmDT):
+    n_acts = 0  # of any copy
+
+    def act(self, observations: Any) -> Any:
+        Counted.n_acts += 1
+        return super().act(observations)
+
+
 class Magnifies(Wrapper):
     def step_arrays(self, commands: Any) -> Any:
         rows, *rest = super().step_arrays(commands)
@@ -62,6 +70,13 @@ def test_what_the_package_has_passes() -> None:
     testing.check_wrapper(make, steps=60)
     testing.check_wrapper(lambda: DiscreteActions(MotionFrame(make().env)), steps=60)
     testing.check_policy("swarm-dt", SMALL, steps=60)
+
+
+def test_an_episode_that_ends_before_the_last_step_is_played_to_its_end() -> None:
+    brief = SMALL.replace(duration=1.0)
+    Counted.n_acts = 0
+    testing.check_wrapper(lambda: parallel_env(brief), Counted(), steps=60)
+    assert Counted.n_acts == 3 * brief.n_steps
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,9 @@ pytest.importorskip("stable_baselines3")
 
 import torch
 
+from swarm_logistics_env.core.errors import TrainingError
 from swarm_logistics_env.policies.learned import Network
-from swarm_logistics_env.train.learner import make_learner
+from swarm_logistics_env.train.learner import make_learner, read_checkpoint, save_checkpoint
 from swarm_logistics_env.train.privileged import PRIVILEGED
 from swarm_logistics_env.train.settings import PPOSettings
 from swarm_logistics_env.train.training_worlds import NetworkView
@@ -91,6 +93,21 @@ def test_what_a_network_tells_is_learned_from_what_is_so_and_is_told_without_noi
     truth = columns[:, network.widths[0] + len(PRIVILEGED) :]
     error = ((estimates - truth) ** 2).mean(dim=1)
     torch.testing.assert_close(judged[2], bare[2] - 0.3 * error)
+
+
+def test_a_checkpoint_of_another_version_of_a_library_is_refused_with_the_reason(
+    small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    training = small()
+    learner = make_learner(NetworkView(training), training.network, training.ppo, 0, "cpu")
+    save_checkpoint(tmp_path, learner, None)
+
+    def refuse(*_: object, **__: object) -> None:
+        raise AttributeError("no class Adam\nin torch")
+
+    monkeypatch.setattr(torch, "load", refuse)
+    with pytest.raises(TrainingError, match=r"pt cannot be read \(no class Adam\): train into a"):
+        read_checkpoint(tmp_path)
 
 
 @pytest.mark.parametrize(("exploration", "temperature"), [(0.0, 1.0), (0.5, 0.5)])

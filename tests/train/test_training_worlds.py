@@ -149,6 +149,20 @@ def test_between_decisions_worlds_go_on_and_their_rewards_are_summed(small: Any)
     assert seldom_dones.all()
 
 
+def test_rewards_change_in_every_world_from_the_next_step_on(small: Any) -> None:
+    first, second = (NetworkView(small(rewards={"contact": -1.0})) for _ in range(2))
+    ahead = np.tile(np.array([1.0, 0.0, 1.0], np.float32), (8, 1))
+    for view in (first, second):
+        view.seed(0)
+        view.reset()
+        assert not view.step(ahead)[1].any()
+    second.change_rewards({"contact": -3.0})
+    paid = np.array([[view.step(ahead)[1] for _ in range(40)] for view in (first, second)])
+    np.testing.assert_allclose(paid[1], 3.0 * paid[0], rtol=1e-6)
+    for world in first.venv.rows_of_worlds:
+        assert (paid[0][:, world] < 0.0).any()
+
+
 def test_headings_at_the_start_are_those_of_the_seed(small: Any) -> None:
     headings = []
     for seed in (3, 3, 4):

@@ -230,6 +230,11 @@ class WarehouseState:
         return len(self.robots.position)
 
     @property
+    def carrier(self) -> int:
+        """The robot that carries the item of the oldest request, or NOBODY."""
+        return NOBODY if self.requested == NOBODY else int(self.item_carrier[self.requested])
+
+    @property
     def delivered(self) -> int:
         """Items delivered so far: the paper's performance P."""
         return len(self.delivery_times)

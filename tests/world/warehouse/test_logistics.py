@@ -217,3 +217,14 @@ def test_gossip_carries_a_timer_on_and_ages_it_by_every_hop(build: Build) -> Non
     rows = steps(build(line, [FAR], relay="gossip"), STAY, STAY, STAY, times=10)
     assert rows[1, lowest] == pytest.approx([1, 3.5, 0, 0.0])
     assert rows[2, lowest] == pytest.approx([1, 3.5, 0, 0.1])
+
+
+def test_the_carrier_is_who_carries_the_item_of_the_oldest_request(build: Build) -> None:
+    world = build([(1.0, 1.0), (7.5, 5.0)], [(7.5, 5.0)])
+    assert world.state.carrier == NOBODY
+    steps(world, STAY, HOLD)
+    assert world.state.carrier == 1
+    for _ in range(10):
+        steps(world, STAY, EAST)
+    assert world.all_delivered
+    assert world.state.carrier == NOBODY  # nothing is asked for
