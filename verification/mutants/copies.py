@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -74,6 +74,7 @@ def run_tests(
     limit: float,
     kernels: str = "numba",
     options: Sequence[str] = (),
+    variables: Mapping[str, str] | None = None,
 ) -> str:
     """Return the first test that fails in a copy, as pytest names it; empty: none does.
 
@@ -84,9 +85,11 @@ def run_tests(
         limit: after which the tests are stopped [s].
         kernels: the folder in which compiled kernels are kept, beside the copy.
         options: further ones of pytest.
+        variables: further ones of the environment.
     """
     environment = {
         **os.environ,
+        **(variables or {}),
         "NUMBA_CACHE_DIR": str(copy.parent / kernels),
         "PYTHONPATH": str(copy),
         # Bytecode is kept: to compile package and tests takes longer than most of the tests.

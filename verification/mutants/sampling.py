@@ -30,6 +30,7 @@ from .nearest import Nearest
 from .places import Place, find_places, is_kernel, required_parameters
 from .reached import Reached
 
+SECONDS_OF_COMPILING = 60.0  # of a core, for kernels that are compiled anew
 SECONDS_OF_REACHING = 40.0  # of the tests that run a line; the nearest follow
 LONGEST = 900.0  # [s] of the clock after which the tests of a fault are stopped
 # What worlds and policies do, to the bit: asked of faults in them that no other test catches.
@@ -301,6 +302,7 @@ def _run(fault: Fault, copy: Path) -> str:
     if fault.interpreted:
         options += ["-m", "not compiled"]
     kernels = "numba-anew" if fault.compiles_anew else "numba"
+    seconds = float(os.environ[budget.SECONDS]) + fault.compiles_anew * SECONDS_OF_COMPILING
     return run_tests(
         copy,
         fault.tests,
@@ -308,6 +310,7 @@ def _run(fault: Fault, copy: Path) -> str:
         limit=LONGEST,
         kernels=kernels,
         options=options,
+        variables={budget.SECONDS: str(seconds)},
     )
 
 
