@@ -37,6 +37,8 @@ LONGEST = 900.0  # [s] of the clock after which the tests of a fault are stopped
 _TRAJECTORIES = "tests/verification/test_trajectories.py"
 # What every room gives, as files hold it: asked of faults that no nearer test catches.
 _RECORDED = "test_recorded*.py"
+# Pages hold signatures, defaults and tables that come from the code: asked of these faults, too.
+_GENERATED = "tests/test_docs.py::test_generated_tables_are_current"
 # Nodes of ROS 2, which the gate has not: `make ros` tests them.
 _NOT_IN_GATE = ("robots/ros_robot.py", "robots/ros_world.py")
 _COMPILER = ("numba", "llvmlite")  # who imports these changes how kernels are compiled
@@ -263,6 +265,7 @@ def _caught_by(fault: Fault, copy: Path) -> str:
     if test:
         return test
     tests = [str(path.relative_to(copy)) for path in sorted((copy / "tests").rglob(_RECORDED))]
+    tests.append(_GENERATED)
     # Each has time of its own, as kernels may be compiled anew for most of it.
     for further in (tests, [_TRAJECTORIES] if fault.is_played else []):
         # Kernels are compiled, as the interpreter would take minutes.

@@ -6,17 +6,24 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
+import matplotlib
 import numpy as np
+import pytest
 
+from swarm_logistics_env import __version__
 from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.report.document import document
+from swarm_logistics_env.study.report.drawing import svg_image
 from swarm_logistics_env.study.report.latex import latex_tables
+from swarm_logistics_env.study.report.page import html
 from swarm_logistics_env.study.report.write import markdown
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks.outcome import Outcome
 from swarm_logistics_env.study.verdicts.results import StudyResults
-from tests.conftest import Check
+from tests.conftest import Check, figures_drawn
 from tests.made_up import judged, paper
+
+RECORDED_WITH = "3.11.2"  # of matplotlib, whose versions draw otherwise
 
 TWO = ["homing", "swarm-dt"]
 EDGE: dict[str, Any] = {
@@ -80,15 +87,51 @@ def studies() -> Iterator[tuple[str, StudyResults]]:
     yield "edge", judged(Study(**EDGE), collapsing)
 
 
-def test_reports_are_as_recorded(check_recorded: Check) -> None:
+@pytest.fixture(scope="module")
+def made_up() -> dict[str, StudyResults]:
+    return dict(studies())
+
+
+def without_versions(text: str) -> str:
+    """Return a text without what changes with any code: digests, and the package's version."""
+    return re.sub(r"\b[0-9a-f]{12,}\b", "DIGEST", text.replace(__version__, "VERSION"))
+
+
+def lines_of_page(page: str) -> list[str]:
+    """Return the lines of a page without scripts, styles, versions and drawings."""
+    page = re.sub(r"<(script|style)\b.*?</\1>", "", page, flags=re.DOTALL)
+    page = re.sub(r"base64,[^\"]+", "", without_versions(page))
+    return [line for line in page.replace("><", ">\n<").splitlines() if line.strip()]
+
+
+def test_pages_are_as_recorded(made_up: dict[str, StudyResults], check_recorded: Check) -> None:
     lines = []
-    for name, results in studies():
+    for name in ("day", "edge"):
+        report = document(made_up[name])
+        drawings = {f.name: svg_image(f.draw, f.height, f.note) for f in report.figures}
+        lines += [f"#### {name}", *lines_of_page(html(report, drawings, latex=""))]
+    check_recorded("pages.txt", lines)
+
+
+@pytest.mark.skipif(matplotlib.__version__ != RECORDED_WITH, reason="of another matplotlib")
+def test_drawings_are_as_recorded(made_up: dict[str, StudyResults], check_recorded: Check) -> None:
+    lines = []
+    with figures_drawn("svg"):
+        for name in ("day", "edge"):
+            for figure in document(made_up[name]).figures:
+                svg = svg_image(figure.draw, figure.height, figure.note)
+                lines += [f"#### {name}, {figure.name}", *svg.splitlines()]
+    check_recorded("drawings.txt", lines)
+
+
+def test_reports_are_as_recorded(made_up: dict[str, StudyResults], check_recorded: Check) -> None:
+    lines = []
+    for name, results in made_up.items():
         report = document(results)
         text = markdown(report)
         if name in ("day", "edge", "failures"):
             text += f"\n{latex_tables(report.paper)}"
-        text = re.sub(r"\b[0-9a-f]{12,}\b", "DIGEST", text)
-        lines += [f"#### {name}", *(line for line in text.splitlines() if line)]
+        lines += [f"#### {name}", *filter(None, without_versions(text).splitlines())]
         lines.append(report.runs.note)
         for table, panel in report.runs.panels.items():
             means = [f"{p.series} {p.category} {p.value:.4g} {p.link}" for p in panel.points]
