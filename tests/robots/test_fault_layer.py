@@ -80,6 +80,16 @@ def test_who_hears_no_requests_knows_of_none_that_it_sees_or_carries() -> None:
     assert not layer.sensed(sensed, 10.0)[requested].any()
 
 
+def test_a_reduced_view_ends_at_a_share_of_the_robots_own() -> None:
+    layer = layer_of("view_reduced:1@10", view_range=2.0)
+    sensed = np.zeros(row.N_COLUMNS, np.float32)
+    items = np.arange(2) * row.ITEM_WIDTH + row.ITEMS
+    sensed[items] = 1.0
+    sensed[items + row.ITEM.x] = 0.9, 1.1  # [m]
+    assert layer.sensed(sensed, 9.9)[items].tolist() == [1.0, 1.0]
+    assert layer.sensed(sensed, 10.0)[items].tolist() == [1.0, 0.0]
+
+
 def test_a_robot_that_is_away_senses_and_does_nothing_until_it_is_back() -> None:
     layer = layer_of("away:1@10+5")
     sensed = np.ones(row.N_COLUMNS)

@@ -10,11 +10,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from swarm_logistics_env import Fault, Scenario
 from swarm_logistics_env.core import progress_bar
 from swarm_logistics_env.core.errors import SetupError, StudyError
-from swarm_logistics_env.study.attack import STORE, Attack, _covariance, attack, search
+from swarm_logistics_env.study.attack import (
+    _NOISES,
+    STORE,
+    Attack,
+    _covariance,
+    _posterior,
+    attack,
+    search,
+)
 from swarm_logistics_env.study.runs.engines import serial
 from swarm_logistics_env.study.runs.store import Runs
 from swarm_logistics_env.study.tasks.outcome import Outcome
@@ -167,3 +176,23 @@ def test_each_run_is_measured_against_that_of_its_seed_without_a_fault(tmp_path:
 
     result = attack(Attack("swarm-dt", SCENARIO, modes=tuple(costs), budget=40), engine, tmp_path)
     assert [worst.fault.mode for worst in result.found] == ["FM2", "FM2"]
+
+
+def test_changes_are_estimated_with_the_noise_under_which_the_runs_are_likeliest() -> None:
+    rng = np.random.default_rng(0)
+    covariance = 0.4 + 0.6 * np.eye(4)
+    runs = np.repeat(np.arange(4), 6)
+    for spread in (0.1, 0.5, 2.0):
+        changes = np.array([0.0, -1.0, 2.0, 0.5])[runs] + rng.normal(0.0, spread, 24)
+        normal = (changes - changes.mean()) / changes.std()
+        priors = {
+            noise: (covariance[np.ix_(runs, runs)] + noise * np.eye(24)) / (1.0 + noise)
+            for noise in _NOISES
+        }
+        likeliest = max(
+            _NOISES, key=lambda noise: multivariate_normal(None, priors[noise]).logpdf(normal)
+        )
+        across = covariance[:, runs] / (1.0 + likeliest)
+        mean, _ = _posterior(covariance, runs, changes)
+        expected = across @ np.linalg.solve(priors[likeliest], normal)
+        np.testing.assert_allclose(mean, changes.mean() + changes.std() * expected)

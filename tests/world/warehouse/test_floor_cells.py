@@ -19,6 +19,7 @@ from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.warehouse.floor_cells import (
     floor_of,
     free_way,
+    index_along,
     is_in_sight,
     is_near_solid,
 )
@@ -56,6 +57,16 @@ def scan_boxes_at(
 @kernel
 def is_in_sight_at(address: int, x: float, y: float, other_x: float, other_y: float) -> bool:
     return is_in_sight(unpacked_at(World, address), x, y, other_x, other_y)
+
+
+@kernel
+def column_of(x: float) -> int:
+    return index_along(x, 0.5, 4)
+
+
+def test_outside_of_the_floor_counts_as_its_edge() -> None:
+    columns = [column_of(x) for x in (-0.6, 0.0, 0.49, 0.5, 1.9, 2.0, 9.0)]
+    assert columns == [0, 0, 0, 1, 3, 3, 3]
 
 
 def put(world: Warehouse, robots: list[list[float]], items: list[list[float]]) -> None:
