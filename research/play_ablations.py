@@ -1,12 +1,14 @@
 """What each part of the recipe `taught` brings: `python -m research.play_ablations` (3 core-hours).
 
-Trains the recipe and versions of it that lack a part each, three times each, for a third of its
-decisions, and measures P in the recipe's world on seeds that nothing was fitted on. It writes a
-block of docs/training.md. What is trained stays in results/ablations, and the same command goes on
-after an interruption.
+Trains the recipe for a third of its decisions, and versions of it that lack a part or talk, three
+times each, and measures P in the recipe's world on seeds that nothing was fitted on. Without a
+teacher PPO takes as many decisions as imitation and PPO do else; without PPO imitation is all. It
+writes a block of docs/training.md. What is trained stays in results/ablations, and the same command
+goes on after an interruption.
 
 Declared before the first training: a part brings something where the 95 % interval of the change
-over trainings (Welch's) without it is below 0. There is no correction for the number of parts.
+over trainings (Welch's) without it is below 0, and messages where that with them is above 0. There
+is no correction for the number of versions.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 
-from research.tables import ROOT, difference_of_means, rewrite, table
+from research.tables import ROOT, difference_of_means, rewrite, table, with_blocks
 from swarm_logistics_env import policies, run_episode
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.spi.summaries import interval_of_mean
@@ -29,6 +31,7 @@ from swarm_logistics_env.world.motion.voices import N_MESSAGES
 
 OUT = ROOT / "results" / "ablations"
 PAGE = ROOT / "docs" / "training.md"
+BLOCK_NAME = "ablations"
 TRAININGS = range(3)
 SEEDS = range(460_000, 460_024)
 WHOLE = "the recipe"
@@ -83,6 +86,8 @@ def rows_of(p: Mapping[str, Numbers]) -> Iterator[tuple[str, ...]]:
 
 def main(processes: int) -> None:
     """Train, measure, and write the table."""
+    # A page without the block is told before anything is trained.
+    with_blocks(PAGE.read_text(encoding="utf-8"), {BLOCK_NAME: ""})
     titles = versions().keys()
     with ProcessPoolExecutor(processes) as pool:
         futures = {
@@ -97,7 +102,7 @@ def main(processes: int) -> None:
         f"{scenario.n_robots} robots, {len(TRAININGS)} trainings each, {len(SEEDS)} seeds from "
         f"{SEEDS[0]:,} on; 95 % intervals over trainings, of changes by Welch's test."
     )
-    rewrite(PAGE, {"ablations": table(("version", "P", "change"), rows_of(p), line)})
+    rewrite(PAGE, {BLOCK_NAME: table(("version", "P", "change"), rows_of(p), line)})
 
 
 if __name__ == "__main__":

@@ -93,7 +93,12 @@ def limits_in(schema: object) -> Iterator[str]:
         for part in schema:
             yield from limits_in(part)
     if isinstance(schema, dict):
-        yield from (f"{word} {schema[word]!r}" for word in LIMITS if word in schema)
+        for word in LIMITS:
+            value = schema.get(word)
+            if isinstance(value, int | float):
+                yield f"{word} {value:g}"
+            elif value is not None and not (word == "enum" and "const" in schema):
+                yield f"{word} {value!r}"
         for name, part in schema.items():
             if name not in LIMITS:
                 yield from limits_in(part)

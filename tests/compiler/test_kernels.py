@@ -165,8 +165,9 @@ def test_compiling_tells_a_person_once_and_never_from_a_worker(tmp_path: Path) -
 
 
 def test_at_a_terminal_a_bar_shows_how_many_kernels_are_compiled(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path))
     monkeypatch.delenv(numba_fence.QUIET, raising=False)
     monkeypatch.setattr(fast_kernels, "_SILENCE", 0.0)
     monkeypatch.setattr(fast_kernels._Report, "is_told", False)

@@ -1,8 +1,8 @@
 """Faults drawn over the whole package, and the share of them that the gate does not catch.
 
 Near tests are asked: those that run the line, where a record says which do, and those of near
-files; then those that compare with a recorded file. Then the type checker runs; the share without
-it is printed, too.
+files; then those that compare with a recorded file, or generated pages with the code; then golden
+trajectories. Then the type checker runs; the share without it is printed, too.
 """
 
 from __future__ import annotations
@@ -198,7 +198,8 @@ def measure_sample(
 ) -> int:
     """Make `count` faults at places of a package; print what survives.
 
-    `seconds`: of a core, after which no further test of a fault begins. Returns 2 if a test that
+    `seconds`: of a core, after which no further test of a group begins; where kernels are compiled
+    anew, later by `SECONDS_OF_COMPILING`. Returns 2 if a test that
     caught faults also fails without one, else 0.
     """
     start = time.monotonic()
@@ -267,11 +268,11 @@ def _caught_by(fault: Fault, copy: Path) -> str:
     tests = [str(path.relative_to(copy)) for path in sorted((copy / "tests").rglob(_RECORDED))]
     tests.append(_GENERATED)
     # Each has time of its own, as kernels may be compiled anew for most of it.
-    for further in (tests, [_TRAJECTORIES] if fault.is_played else []):
+    for group in (tests, [_TRAJECTORIES] if fault.is_played else []):
         # Kernels are compiled, as the interpreter would take minutes.
         anew = fault.interpreted or fault.compiles_anew
-        wide = fault._replace(tests=tuple(further), interpreted=False, compiles_anew=anew)
-        if further and (test := _caught_by_nearest(wide, copy)):
+        wide = fault._replace(tests=tuple(group), interpreted=False, compiles_anew=anew)
+        if group and (test := _caught_by_nearest(wide, copy)):
             return test
     return ""
 

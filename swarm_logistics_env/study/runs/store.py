@@ -278,8 +278,8 @@ class Runs:
     def _transaction(self) -> Iterator[None]:
         """Keep all that the block writes or, if it fails, nothing of it."""
         with self._writing, self._explained():
-            self._execute("BEGIN IMMEDIATE")
             try:
+                self._execute("BEGIN IMMEDIATE")
                 yield
                 self._connection.commit()
             except BaseException:

@@ -258,7 +258,7 @@ class RecordedFault(Record):
     onset: float = 0.0
 
 
-_NOT_AGAIN = "recorded trials cannot be played again: give a file with more of them"
+_CANNOT_BE_PLAYED = "recorded trials cannot be played again: give a file with more of them"
 
 
 class RecordedTrials:
@@ -285,7 +285,7 @@ class RecordedTrials:
         self, mode: str, robots: int, onset: float, duration: float | None, manner: Fields
     ) -> RecordedFault:
         """Raise, as `play` does."""
-        raise StudyError(_NOT_AGAIN)
+        raise StudyError(_CANNOT_BE_PLAYED)
 
     def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
         """Raise: what was recorded cannot be played again.
@@ -293,7 +293,7 @@ class RecordedTrials:
         Raises:
             StudyError: always.
         """
-        raise StudyError(_NOT_AGAIN)
+        raise StudyError(_CANNOT_BE_PLAYED)
 
 
 WAREHOUSE = WarehouseTask()

@@ -9,6 +9,8 @@ from .words import MEANING, TIMES, plain
 
 _ROBOT = re.compile(r"(robot|agent|drone|bot)(_?(id|no|nr|num|number|name|index|label))?|id_robot")
 
+_IN_PERCENT = re.compile(r"(.*\S)\s+in\s+%\s*")
+
 
 class ColumnName(str):
     """The name of a column as a file has it."""
@@ -17,13 +19,15 @@ class ColumnName(str):
 
     @property
     def bare(self) -> str:
-        """In small letters, without accents and unit: "Time [s]" is "time", "P in %" is "p"."""
-        without_brackets = re.sub(r"\s*[\[(].*?[\])]\s*|\s+in\s+%$", " ", self)
+        """In small letters, without accents and unit: "Time [s]" is "time"."""
+        without_brackets = re.sub(r"\s*[\[(].*?[\])]\s*", " ", self)
         return re.sub(r"\W+", "_", plain(without_brackets)).strip("_")
 
     @property
     def meaning(self) -> str | None:
         """What the column is by its name, a key of `COLUMN_NAMES`; None: it is not known."""
+        if percent := _IN_PERCENT.fullmatch(self):  # "P in %", but no number of robots
+            return "performance" if ColumnName(percent[1]).meaning == "performance" else None
         word = self.bare
         stem = without_unit(word)
         is_time = MEANING.get(stem) in TIMES and stem != "length"  # whose "min" may be the least

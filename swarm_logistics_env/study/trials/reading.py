@@ -72,7 +72,7 @@ def read_trials(
         IndicatorError: the file cannot be read, or a line of it; names line, column and value.
     """
     mapped = dict(columns or {})
-    table = long_of(read_table(source, mapped, ignore), mapped, ignore, wide, decimal)
+    table = long_of(read_table(source, mapped, ignore), mapped, ignore, wide, decimal, thousands)
     table = with_values(with_constants(table, mapped), mapped, values)
     table = summed_over(table, sum_over, mapped)
     table_columns, complaints = _columns_of(

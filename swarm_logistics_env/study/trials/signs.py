@@ -9,7 +9,7 @@ from dataclasses import replace
 from swarm_logistics_env.spi.inputs import IndicatorError
 
 from .complaints import Complaints
-from .table import Cells, Table
+from .table import Cells, Table, like_a_number
 from .words import means_no_number
 
 # With a sign between thousands and the other one before decimals.
@@ -52,7 +52,7 @@ def with_signs(
             f"Numbers are taken to have {thousands} between thousands and {decimal} before "
             f"decimals, as in {text}."
         )
-    if decimal is None and (text := decimal_comma(columns)):
+    if decimal is None and (text := _decimal_comma(columns)):
         decimal = ","
         notes.append(f"Decimals are taken to have a comma, as in {text}.")
     if decimal is None and thousands is None:
@@ -62,16 +62,28 @@ def with_signs(
     return replace(table, decimal=decimal or ".", thousands=thousands), notes
 
 
+def sign_before_decimals(
+    table: Table, columns: Sequence[Cells], decimal: str | None, thousands: str | None
+) -> str:
+    """Return the sign before decimals, as said or as these columns show; see `with_signs`."""
+    said = decimal or table.decimal or ("," if thousands == "." else None)
+    if said is not None or thousands is not None:
+        return said or "."
+    if text := _both_signs(columns):
+        return re.sub(r"[\d+-]", "", text)[-1]
+    return "," if _decimal_comma(columns) else "."
+
+
 def _both_signs(columns: Sequence[Cells]) -> str | None:
     """Return a cell with a sign between thousands and one before decimals; None: none has both."""
     texts = {text for cells in columns for text in cells.texts}
     return min((text for text in texts if _BOTH_SIGNS.fullmatch(text)), default=None)
 
 
-def decimal_comma(columns: Sequence[Cells]) -> str | None:
-    """Return a cell whose comma stands before decimals, if no cell has a point; None: none."""
+def _decimal_comma(columns: Sequence[Cells]) -> str | None:
+    """Return a cell whose comma stands before decimals, if no number has a point; None: none."""
     texts = {text for cells in columns for text in cells.texts if not means_no_number(text)}
-    if any("." in text for text in texts):
+    if any("." in text and like_a_number(text) for text in texts):  # a date is none
         return None
     return min((text for text in texts if _DECIMAL_COMMA.fullmatch(text)), default=None)
 

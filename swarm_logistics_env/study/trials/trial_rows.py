@@ -118,21 +118,15 @@ def trial_of(
     duration: float | None,
 ) -> Trial:
     """Return the trial of a row, of an event log without its times; arguments as of `trials_of`."""
-    if row.text("duration"):
-        in_row = row.number("duration", 0.0)
-        if duration not in (None, in_row):
-            raise row.error(
-                "duration",
-                f"should be the {duration:g} s of --duration; leave out either the option, or the "
-                f"column by --ignore {quote(row.columns.by_meaning['duration'].name)}",
-            )
-        duration = in_row
+    _refuse_two_durations(row, duration)
     performance, least = performance_of(row, finished, duration)
     n_robots = row.whole_or_none("n_robots", 1)
     fault = faults[row.text("fault")]
     faulty = row.whole_or_none("faulty", 0) or 0
     is_fault = fault not in (NO_FAULT_WORD, REPEATED)
     onset = row.number_or_none("onset") or 0.0
+    if row.text("duration"):
+        duration = row.number("duration", 0.0)
     if is_fault and not faulty:
         raise row.error("faulty", f"should be how many robots fail by {fault!r}, 1 or more")
     if faulty and not is_fault:
@@ -159,6 +153,21 @@ def trial_of(
         contacts=row.number_or_none("contacts"),
         least=least,
     )
+
+
+def _refuse_two_durations(row: Row, duration: float | None) -> None:
+    """Refuse a row that says another duration than the option, but for times to finish.
+
+    Of these the option says the limit, and the column how long a trial lasted.
+    """
+    if duration is None or not row.text("duration") or "time_to_finish" in row.columns.by_meaning:
+        return
+    if row.number("duration", 0.0) != duration:
+        raise row.error(
+            "duration",
+            f"should be the {duration:.15g} of --duration; leave out either the option, or the "
+            f"column by --ignore {quote(row.columns.by_meaning['duration'].name)}",
+        )
 
 
 def check_labels(rows: Sequence[tuple[Trial, Row]]) -> None:

@@ -46,6 +46,8 @@ _INVERSE = re.compile(r"\s*(\^|\*\*)?\s*([-−]1\b|⁻¹)")
 _PER = frozenset(("per", "pro", "par", "por", "al", "je", "every", "each"))
 _OTHER_UNITS = frozenset(("m", "mm", "cm", "dm", "km", "hz"))  # at the end of a name
 
+KNOWN_UNITS = frozenset((*UNIT_OF, *_OTHER_UNITS, "m/s", "%"))
+
 
 class NamedUnit(NamedTuple):
     """A unit of time in a name.

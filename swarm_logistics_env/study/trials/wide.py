@@ -15,9 +15,10 @@ from shlex import quote
 from swarm_logistics_env.spi.inputs import IndicatorError
 
 from .column_name import ColumnName
-from .signs import decimal_comma
+from .signs import sign_before_decimals
 from .table import Table
 from .trial import NO_FAULT_WORD
+from .units import KNOWN_UNITS, UNIT_OF
 from .words import CELLS, COLUMN_NAMES, MEANING, REPETITIONS, plain, usual_fault
 
 MEASURED = ("performance", "time", "time_to_finish")
@@ -34,6 +35,8 @@ _COUNTED = re.compile(
 _UNIT = re.compile(r"\s*(\[.*\]|\([^\d)]+\))\s*$")
 _NUMBER = re.compile(r"\d+(?:[.,]\d+)?")
 
+_LABELS = ("policy", "table", "seed", "fault")  # what is no number
+
 Condition = dict[str, str]  # what a column is of: the cell of each new column, by its name
 
 
@@ -43,6 +46,7 @@ def long_of(
     ignore: Sequence[str],
     wide: str | None,
     decimal: str | None,
+    thousands: str | None,
 ) -> Table:
     """Return a table with a row for each trial, of one with a column for each condition.
 
@@ -54,6 +58,7 @@ def long_of(
         wide: what the columns differ in: a word of `COLUMN_NAMES`, or the name of a parameter;
             None: what their names say.
         decimal: the sign before decimals in cells, as somebody says; None: nobody does.
+        thousands: the sign between thousands, likewise.
 
     Raises:
         IndicatorError: `wide` is said of columns whose names do not tell it, or of no columns.
@@ -83,15 +88,16 @@ def long_of(
     else:
         names = {number: _UNIT.sub("", table.header[number]) for number in numbers}
         conditions = {} if is_long else _read_off(names)
-    if decimal == "," or (decimal is None and decimal_comma(table.columns_in_order)):
+    measured = [all_cells[number] for number in numbers]
+    if sign_before_decimals(table, measured, decimal, thousands) == ",":
         conditions = {n: _with_commas(condition) for n, condition in conditions.items()}
     return _melted(table, conditions, columns) if conditions else table
 
 
 def _with_commas(condition: Condition) -> Condition:
-    """Return a condition whose parameters have a decimal comma, as the cells have."""
+    """Return a condition whose numbers have a decimal comma, as the cells have."""
     return {
-        name: value if name in MEANING else value.replace(".", ",")
+        name: value if MEANING.get(name) in _LABELS else value.replace(".", ",")
         for name, value in condition.items()
     }
 
@@ -168,11 +174,12 @@ def _melted(table: Table, conditions: Mapping[int, Condition], columns: Mapping[
     if len(sizes) == 1:  # "none" beside "wheel 1 of 8"
         conditions = {n: {**condition, "robots": min(sizes)} for n, condition in conditions.items()}
     units = {match[0] for n in conditions if (match := _UNIT.search(table.header[n]))}
-    in_brackets = sorted({unit.strip() for unit in units if "[" in unit})
-    if len(in_brackets) > 1:
+    words = {unit.strip(" []()").casefold(): unit.strip() for unit in units}
+    if len({UNIT_OF.get(word, word) for word in words if word in KNOWN_UNITS}) > 1:
+        names = ", ".join(repr(table.header[number]) for number in conditions)
         raise IndicatorError(
-            f"{table.source}: columns of conditions have the units {' and '.join(in_brackets)}: "
-            "should have one unit"
+            f"{table.source}: {names} have several units, {' and '.join(sorted(words.values()))}: "
+            "should have one; leave some out by --ignore NAME"
         )
     measured = CELLS + (units.pop().rstrip() if len(units) == 1 else "")
     new = [*dict.fromkeys(name for condition in conditions.values() for name in condition)]

@@ -237,7 +237,6 @@ for line in sys.stdin:
 """
 
 
-@pytest.mark.daily
 def test_a_ctrl_c_at_the_start_of_a_transaction_lets_the_store_close(tmp_path: Path) -> None:
     """Where it comes before the block's first line, Python ends the transaction after the store."""
     runs = Runs(tmp_path / FILE_NAME)
@@ -249,6 +248,7 @@ def test_a_ctrl_c_at_the_start_of_a_transaction_lets_the_store_close(tmp_path: P
         reopened.note("name", "written")
 
 
+@pytest.mark.daily
 def test_two_processes_may_make_the_store_at_once(tmp_path: Path) -> None:
     pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
     makers = [subprocess.Popen([sys.executable, "-c", MAKER, name], **pipes) for name in "01"]

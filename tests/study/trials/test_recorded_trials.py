@@ -110,6 +110,22 @@ TRIALS: dict[str, tuple[str, dict[str, Any]]] = {
     "a column a size": ("seed,4 robots,8 robots,16 robots\n1,5,9,15\n2,6,10,16\n3,7,,\n", {}),
     "a column a width": ("robots,1 m,2 m\n4,5,6\n4,7,8\n", {"wide": "width"}),
     "commas in names and cells": ("N;width=1,5 m;width=2 m\n4;5,25;6,5\n4;5,5;7,5\n", {}),
+    "commas and dates": (
+        "day;width=1,5 m;width=2 m\n12.03.2026;5,25;6,5\n13.03.2026;5,5;7,5\n",
+        {},
+    ),
+    "points between thousands": ("day;width=1,5 m;width=2 m\n1;1.205,5;6\n2;1.300;7\n", {}),
+    "onsets in names": (
+        "robots;fault;m;1,5;2,5\n4;none;0;5;6\n4;jam;1;3;2\n",
+        {"wide": "onset", "decimal": ","},
+    ),
+    "several units": ("seed,N=4 (s),N=8 (min)\n1,5,9\n2,6,10\n", {}),
+    "units in two words": ("seed,N=4 [s],N=8 [sec]\n1,5,9\n2,6,10\n", {}),
+    "a limit and how long it lasted": (
+        "robots,time to finish,finished,duration\n4,200,yes,\n4,,no,250\n8,150,yes,\n",
+        {"duration": 300.0},
+    ),
+    "percent of robots": ("robots,fault,failed in %,P\n50,none,0,9\n50,jam,10,5\n", {}),
     "commas in names alone": ("N;width=1,5 m;width=2 m\n4;5.25;6\n4;5.5;7\n", {}),
     "commas that are said": ("N;1.5 m;2 m\n4;5;6\n4;5;7\n", {"wide": "width", "decimal": ","}),
     "a column a repetition": ("robots,run 1,run 2,run 3\n4,5,6,7\n8,9,10,\n", {}),
