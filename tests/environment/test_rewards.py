@@ -250,11 +250,11 @@ def test_other_rewards_are_paid_from_the_next_step_on_and_wrong_ones_change_noth
     env, contact = (
         SwarmLogisticsEnv(**size, rewards=weights) for weights in (None, {"contact": -1.0})
     )
-    for each in (env, contact):
-        each.reset_arrays(0)
+    for world in (env, contact):
+        world.reset_arrays(0)
     commands = np.tile([1.0, 0.0, 0.1, 0.0], (8, 1))
     for step in range(30):
-        paid, expected = (each.step_arrays(commands)[1] for each in (env, contact))
+        paid, expected = (world.step_arrays(commands)[1] for world in (env, contact))
         assert paid.tolist() == (expected if step >= 10 else np.zeros(8)).tolist()
         if step == 9:
             env.change_rewards({"contact": -1.0})
