@@ -126,23 +126,27 @@ def test_robots_do_what_the_network_says_where_the_teacher_has_no_share(small: A
     training = small(network=CLASSES, teacher=teacher)
     learner = make_learner(NetworkView(training), CLASSES, training.ppo, training.seed, "cpu")
     view = learner.env
-    read: list[Any] = [view.reset().copy()]  # by the networks, before each decision
-    driven: list[Any] = []
-    said: list[Any] = []
+    columns: list[Any] = [view.reset().copy()]  # before each decision
+    commanded_outputs: list[Any] = []
+    network_outputs: list[Any] = []
 
     def give_outputs(outputs: Any) -> None:
         with torch.no_grad():
-            answers = learner.policy.answers_of(torch.from_numpy(read[-1][:, : CLASSES.widths[0]]))
-            said.append(learner.policy.likeliest_outputs(answers))
-        driven.append(outputs.copy())
+            answers = learner.policy.answers_of(
+                torch.from_numpy(columns[-1][:, : CLASSES.widths[0]])
+            )
+            network_outputs.append(learner.policy.likeliest_outputs(answers))
+        commanded_outputs.append(outputs.copy())
         type(view).give_outputs(view, outputs)
 
     def step_wait() -> Any:
         stepped = type(view).step_wait(view)
-        read.append(stepped[0].copy())
+        columns.append(stepped[0].copy())
         return stepped
 
     view.give_outputs, view.step_wait = give_outputs, step_wait
     imitate(training, learner, TrainingLog(), generator(0, "imitation"))
-    assert len(driven) > 10
-    np.testing.assert_array_equal(driven[1:], said[1:])  # it begins new episodes
+    assert len(commanded_outputs) > 10
+    np.testing.assert_array_equal(
+        commanded_outputs[1:], network_outputs[1:]
+    )  # it begins new episodes

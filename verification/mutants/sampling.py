@@ -199,8 +199,8 @@ def measure_sample(
     """Make `count` faults at places of a package; print what survives.
 
     `seconds`: of a core, after which no further test of a group begins; where kernels are compiled
-    anew, later by `SECONDS_OF_COMPILING`. Returns 2 if a test that
-    caught faults also fails without one, else 0.
+    anew, later by `SECONDS_OF_COMPILING`. Returns 2 if a test that caught faults also fails without
+    one, else 0.
     """
     start = time.monotonic()
     os.environ[budget.SECONDS] = str(seconds)

@@ -8,7 +8,7 @@ somebody has to say it, by --wide.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from shlex import quote
 
@@ -88,8 +88,8 @@ def long_of(
     else:
         names = {number: _UNIT.sub("", table.header[number]) for number in numbers}
         conditions = {} if is_long else _read_off(names)
-    measured = [all_cells[number] for number in numbers]
-    if sign_before_decimals(table, measured, decimal, thousands) == ",":
+    condition_cells = [all_cells[number] for number in numbers]
+    if sign_before_decimals(table, condition_cells, decimal, thousands) == ",":
         conditions = {n: _with_commas(condition) for n, condition in conditions.items()}
     return _melted(table, conditions, columns) if conditions else table
 
@@ -174,13 +174,7 @@ def _melted(table: Table, conditions: Mapping[int, Condition], columns: Mapping[
     if len(sizes) == 1:  # "none" beside "wheel 1 of 8"
         conditions = {n: {**condition, "robots": min(sizes)} for n, condition in conditions.items()}
     units = {match[0] for n in conditions if (match := _UNIT.search(table.header[n]))}
-    words = {unit.strip(" []()").casefold(): unit.strip() for unit in units}
-    if len({UNIT_OF.get(word, word) for word in words if word in KNOWN_UNITS}) > 1:
-        names = ", ".join(repr(table.header[number]) for number in conditions)
-        raise IndicatorError(
-            f"{table.source}: {names} have several units, {' and '.join(sorted(words.values()))}: "
-            "should have one; leave some out by --ignore NAME"
-        )
+    _refuse_several_units(table, [table.header[number] for number in conditions], units)
     measured = CELLS + (units.pop().rstrip() if len(units) == 1 else "")
     new = [*dict.fromkeys(name for condition in conditions.values() for name in condition)]
     for name in (*new, measured):
@@ -216,6 +210,17 @@ def _melted(table: Table, conditions: Mapping[int, Condition], columns: Mapping[
         origins=[table.origins[row] for row in rows] if table.origins else (),
         notes=(*table.notes, note),
     )
+
+
+def _refuse_several_units(table: Table, names: Sequence[str], units: Collection[str]) -> None:
+    """Refuse columns of conditions, by their names, whose units are known and differ."""
+    words = {unit.strip(" []()").casefold(): unit.strip() for unit in units}
+    if len({UNIT_OF.get(word, word) for word in words if word in KNOWN_UNITS}) > 1:
+        raise IndicatorError(
+            f"{table.source}: {', '.join(map(repr, names))} have several units, "
+            f"{' and '.join(sorted(words.values()))}: should have one; leave some out by --ignore "
+            "NAME"
+        )
 
 
 def _empty_ends(table: Table, conditions: Mapping[int, Condition]) -> set[tuple[int, int]]:
