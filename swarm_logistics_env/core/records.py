@@ -191,12 +191,13 @@ class Record(BaseModel):
 
     @classmethod
     def _problem(cls, problem: dict[str, Any]) -> str:
-        # Parts such as "constrained-int" name a branch of a union, not a field.
+        # Parts such as "constrained-int" or "int" name a branch of a union, not a field.
         parts = [str(part) for part in problem["loc"]]
         if problem["type"] == "extra_forbidden" and len(parts) == 1:
             (unknown,) = parts
             return f"{cls.__name__} has no field {unknown!r}{suggest(unknown, cls.model_fields)}"
-        name = ".".join(part for part in parts if part.isidentifier() or part.isdigit())
+        names = [part for part in parts if part.isidentifier() or part.isdigit()]
+        name = ".".join(part for part in names if part not in _TYPES)
         field = f"{cls.__name__}.{name}" if name else cls.__name__
         message = _in_plain_words(problem)
         if message.startswith(f"{cls.__name__}"):
@@ -299,6 +300,7 @@ def canonical_json(value: object) -> str:
 
 
 # By pydantic's names of problems; numbers are its limits.
+_TYPES = ("bool", "float", "int", "str")
 _PLAIN_WORDS = {
     "tuple_type": "should be a list",
     "model_type": "should be a table of fields",

@@ -203,7 +203,8 @@ def collapsed_in_words(
         )
     left = len(ordered) - len(words)
     listed = ", ".join(words)
-    return f"{listed} and {left} conditions more (--full)" if left > 0 else listed
+    more = f"{section.plural(left, 'condition')} more"
+    return f"{listed} and {more} (--full)" if left > 0 else listed
 
 
 def untestable_in_words(by_reason: Mapping[str, Sequence[Cell]], *, names_policies: bool) -> str:

@@ -77,8 +77,11 @@ def curves(
             axes.minorticks_off()
             axes.set_xticks(places, [f"{place:g}" for place in places])
             make_logarithmic(axes)
-    for axes, panel in zip(grid[-1], panels[-n_columns:]):
+    lowest = grid.flat[max(0, len(panels) - n_columns) : len(panels)]
+    for axes, panel in zip(lowest, panels[-n_columns:]):
         axes.set_xlabel(panel.x_label)
+    for axes in grid.flat[len(panels) :]:
+        axes.set_axis_off()
     for axes in grid[:, 0]:
         axes.set_ylabel(y_label)
         if not logarithmic:  # after the last curve, as this fixes the scale

@@ -110,7 +110,7 @@ class _Compared(NamedTuple):
         if self.main.interval is None:
             return (
                 f"P of {first} and of {second} cannot be compared: {self.main.problem} "
-                f"({condition})"
+                f"({condition})."
             )
         times = f"{section.bracketed(factor_of(self.main.interval), 2, [1.0])} times"
         level = section.percent(self.main.level or CONFIDENCE)

@@ -193,7 +193,8 @@ def rate_curves(results: StudyResults, comparison: Comparison) -> tuple[RateCurv
     """Return the delivery rates without fault, with the robots removed, and with the fault."""
     window = window_of(comparison)
     end = comparison.original.case.scenario.duration
-    seconds = np.arange(window, end + _STEP / 2, min(_STEP, window / 10)).round(6)
+    step = min(_STEP, window / 10)
+    seconds = np.arange(window, end + step / 2, step).round(6)
     original = comparison.original
     removed = comparison.removed
     faulty = comparison.changed

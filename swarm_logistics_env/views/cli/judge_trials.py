@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from typer import Argument, Option, echo
 
 from swarm_logistics_env.core.errors import StudyError
-from swarm_logistics_env.study.report.section import Texts
+from swarm_logistics_env.study.report.section import Texts, plural
 from swarm_logistics_env.study.runs.notes import StoredStudy
 from swarm_logistics_env.study.runs.recorded import RecordedStudy, notes_on
 from swarm_logistics_env.study.runs.store import FILE_NAME
@@ -182,7 +182,7 @@ def _show_how_read(trials: Trials, source: str) -> None:
         f"{len(conditions)} conditions",
         ("policy", "fault", "parameters", "N", "trials"),
         rows[:_MOST_ROWS],
-        *([f"And {left} rows more."] if left > 0 else []),
+        *([f"And {plural(left, 'row')} more."] if left > 0 else []),
     )
 
 

@@ -167,12 +167,12 @@ def what_the_rest_takes(results: StudyResults, seconds_a_run: float) -> str:
         f"The first look comes in {clock(seconds[0])}, the whole takes at most {clock(seconds[1])} "
         "(h:mm:ss or m:ss)."
     )
-    means = [cell.mean.value for cell in results.cells if cell.n_seeds >= first and cell.mean.value]
-    scatters = [np.std(cell.by_seed, ddof=1) for cell in results.cells if cell.n_seeds >= first]
-    if seconds_a_run < _SLOW or not means:
+    cells = [cell for cell in results.cells if cell.n_seeds >= first and cell.mean.value]
+    if seconds_a_run < _SLOW or not cells:
         return text
+    scatter = np.std(cells[0].by_seed, ddof=1) / cells[0].mean.value
     # Of a difference of two unpaired means, at 5 % of error and a power of 80 %.
-    effects = [2.8 * math.sqrt(2.0 / n) * scatters[0] / means[0] for n in (first, most)]
+    effects = [2.8 * math.sqrt(2.0 / n) * scatter for n in (first, most)]
     return (
         f"{text} A run takes {seconds_a_run:.1f} s: --seeds {first} ends after the first look and "
         f"tells effects of about {effects[0]:.2f}, {most} seeds those of about {effects[1]:.2f}."

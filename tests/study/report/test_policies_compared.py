@@ -14,6 +14,7 @@ from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.report import section
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.document import document
+from swarm_logistics_env.study.report.policies_compared import compare_policies
 from swarm_logistics_env.study.report.terminal_answer import terminal_answer
 from swarm_logistics_env.study.tasks.outcome import Outcome
 from swarm_logistics_env.study.trial_study import judge
@@ -77,6 +78,36 @@ def test_the_first_line_says_by_how_much_other_conditions_differ_and_which_level
     level = section.percent(results.level)
     assert level != "95 %"
     assert f"that of swarm-dt (N = 25, {level}); also more" in answer(results).comparison
+
+
+def test_the_first_line_says_what_is_less_the_same_and_cannot_be_compared() -> None:
+    faults = [{"modes": ["FM1"], "robots": [1]}]
+    study = Study(
+        policies=["homing", "swarm-dt"], seeds=8, sizes=[SIZES], faults=faults,
+        indicators=["S", "R"], compares_policies=True,
+    )  # fmt: skip
+
+    def play_behind(policy: str, setting: Setting, seed: int) -> Outcome:
+        is_alike = policy == "homing" or setting.name == "FM1"
+        count = (40 if is_alike else 60) + (7 * seed + (policy == "homing") * seed**2) % 5
+        return delivered(count, digest=f"{policy} {setting} {seed}")
+
+    less = compare_policies(judged(study, play_behind))
+    assert less.sentence == (
+        "P of homing is 0.68 [0.66, 0.69] times that of swarm-dt (N = 25); also less in 1 of 2 "
+        "other conditions; open: FM1 m = 1."
+    )
+    assert (less.factors, less.turns) == ({"swarm-dt": ("1.48 [1.45, 1.51]", "more")}, "")
+    same = compare_policies(judged(study, lambda _, at, s: delivered(40 + s, digest=f"{at} {s}")))
+    words = "Whether P of homing or of swarm-dt is larger is unaffected: 1.00 [1.00, 1.00] times ("
+    assert same.sentence.startswith(f"{words}N = 25)")
+    assert same.factors == {"swarm-dt": ("1.00 [1.00, 1.00]", "unaffected")}
+    nothing = compare_policies(
+        judged(study, lambda policy, *_: delivered(0 if policy == "swarm-dt" else 40))
+    )
+    words = "P of homing and of swarm-dt cannot be compared: it delivers nothing (N = 25)."
+    assert nothing.sentence == words
+    assert nothing.factors == {"swarm-dt": ("–", "undefined")}
 
 
 def test_policies_share_the_row_of_a_question_in_the_figure_and_the_legend_names_them() -> None:
