@@ -5,6 +5,7 @@ import subprocess
 import sys
 import textwrap
 import threading
+from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import Any
 
@@ -167,7 +168,10 @@ def test_a_file_counts_with_the_neighbours_that_its_text_names(tmp_path: Path) -
     (package / "inner").mkdir(parents=True)
     files = {
         "kit/__init__.py": "",
-        "kit/mine.py": "def act():\n    from .inner import deep\n    import_module('later')\n",
+        "kit/mine.py": "def act():\n    from .inner import deep\n    import_module('later')\n"
+        "    import fast\n",
+        f"kit/fast{EXTENSION_SUFFIXES[0]}": "\0",  # machine code
+        "kit/fast.txt": "",
         "kit/inner/__init__.py": "",
         "kit/inner/deep.py": "import beside\n",
         "kit/later.py": "X = 1\n",
@@ -178,7 +182,8 @@ def test_a_file_counts_with_the_neighbours_that_its_text_names(tmp_path: Path) -
     for name, text in files.items():
         (tmp_path / name).write_text(text)
     before = files_of(package / "mine.py")
-    assert before.keys() == {"__init__.py", "mine.py", "deep.py", "later.py", "beside.py"}
+    fast = f"fast{EXTENSION_SUFFIXES[0]}"
+    assert before.keys() == {"__init__.py", "mine.py", "deep.py", "later.py", "beside.py", fast}
     for name in files:
         (tmp_path / name).write_text(f"{files[name]}Y = 2\n")
         after = files_of(package / "mine.py")
@@ -245,3 +250,14 @@ def test_the_code_version_is_that_of_what_decides_an_episode(
     before = package_code(*EPISODE_CODE)
     monkeypatch.setattr(Path, "read_text", read_changed)
     assert (package_code.__wrapped__(*EPISODE_CODE) != before) == counts
+
+
+def test_the_code_version_is_of_the_named_files_in_the_order_of_their_paths(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("swarm_logistics_env.core.fingerprint._hash", lambda *texts: texts)
+    names_and_texts = package_code.__wrapped__("train/teacher.py", "core/*.py", "!core/errors.py")
+    names = [path.relative_to(PACKAGE).as_posix() for path in PACKAGE.glob("core/*.py")]
+    names = sorted({*names, "train/teacher.py"} - {"core/errors.py"})
+    assert list(names_and_texts[::2]) == names
+    assert list(names_and_texts[1::2]) == [(PACKAGE / name).read_text("utf-8") for name in names]

@@ -11,7 +11,8 @@ import pytest
 
 import swarm_logistics_env
 from swarm_logistics_env import adapters, spi
-from swarm_logistics_env.core.moved_names import MOVED, PACKAGE, name_today
+from swarm_logistics_env.core import errors
+from swarm_logistics_env.core.moved_names import MOVED, PACKAGE, install, name_today
 
 
 @pytest.fixture(autouse=True)
@@ -34,6 +35,40 @@ def test_a_former_name_is_what_it_is_called_today_with_a_warning(former_name: st
         )
     holder, _, name = f"{PACKAGE}.{MOVED[former_name]}".rpartition(".")
     assert former is getattr(importlib.import_module(holder), name)
+
+
+def test_who_uses_a_former_name_is_named_in_the_warning() -> None:
+    sentence = f"^{PACKAGE}.errors is now {PACKAGE}.core.errors$"
+    with pytest.warns(DeprecationWarning, match=sentence) as warnings:
+        assert swarm_logistics_env.errors is errors
+    assert [warning.filename for warning in warnings] == [__file__]
+
+
+def test_former_names_are_found_by_one_finder_before_all_others(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    others = [finder for finder in sys.meta_path if type(finder).__name__ != "_FormerNames"]
+    monkeypatch.setattr(sys, "meta_path", [*others])
+    for _ in range(2):
+        install()
+    first, *further = sys.meta_path
+    assert (type(first).__name__, further) == ("_FormerNames", others)
+
+
+@pytest.mark.parametrize(
+    ("name", "today"),
+    [
+        (f"{PACKAGE}.warehouse", f"{PACKAGE}.world.warehouse"),
+        (f"{PACKAGE}.warehouse.faults.Fault", f"{PACKAGE}.world.warehouse.faults.Fault"),
+        (f"{PACKAGE}.world.warehouse", None),
+        (PACKAGE, None),
+        ("other.warehouse", None),
+    ],
+)
+def test_a_name_of_today_is_that_of_the_longest_part_that_moved(
+    name: str, today: str | None
+) -> None:
+    assert name_today(name) == today
 
 
 def test_what_lies_under_a_former_name_is_no_second_copy() -> None:

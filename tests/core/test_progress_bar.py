@@ -39,6 +39,23 @@ def test_lines_tell_what_is_done_and_what_is_left(
     assert [clock(seconds) for seconds in (4.6, 245, 3723)] == ["0:05", "4:05", "1:02:03"]
 
 
+def test_the_time_that_is_left_is_in_proportion_to_what_was_done_since_the_beginning(
+    capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Console, "is_terminal", False)
+    now = [0.0, 0.0]
+    monkeypatch.setattr("rich.console.monotonic", lambda: now[0])
+    monkeypatch.setattr(progress_bar, "monotonic", lambda: now[1])
+    with ProgressBar("mine", 8, "runs", done=2) as progress:
+        for elapsed, done in ((29.9, 3), (60.0, 6), (89.9, 7), (90.1, 7)):
+            now[:] = elapsed, elapsed
+            progress.reach(done, f"{done} finished")
+    assert capsys.readouterr().err.splitlines() == [
+        "mine: 6 of 8 runs, 1:00 so far, 0:30 left, 6 finished",
+        "mine: 7 of 8 runs, 1:30 so far, 0:18 left, 7 finished",
+    ]
+
+
 def test_a_bar_tells_what_is_done(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Console, "is_terminal", True)
     monkeypatch.setenv("COLUMNS", "120")

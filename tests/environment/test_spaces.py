@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import policies
+from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.spaces import ITEM_COLUMNS, ROBOT_FEATURES
 from swarm_logistics_env.policies.policy import decide, start
@@ -36,6 +37,18 @@ def test_the_state_tells_what_the_world_holds_and_zeros_of_what_is_gone(n_reques
         ):
             assert robots[name].tolist() == rows[:, column].tolist()
         carried += int(robots["carrying_requested"].sum())
+        timers = np.nan_to_num(world.robot_timer, nan=env.scenario.timer_limit)
+        way = np.maximum(env.scenario.storage_width - world.robot_position[:, 0], 0.0)
+        for name, values in (
+            ("cos_heading", np.cos(world.robot_heading)),
+            ("sin_heading", np.sin(world.robot_heading)),
+            ("velocity_x", np.clip(world.robot_velocity[:, 0], -2.0, 2.0)),
+            ("velocity_y", np.clip(world.robot_velocity[:, 1], -2.0, 2.0)),
+            ("timer", timers),
+            ("to_delivery", way),
+        ):
+            np.testing.assert_allclose(robots[name], np.where(present, values, 0.0), atol=1e-6)
+        assert state[-1] == np.float32(world.time)
         for axis, name in enumerate(("x", "y")):
             places = np.where(present, world.robot_position[:, axis], 0.0)
             np.testing.assert_allclose(robots[name], places, atol=1e-6)
@@ -48,3 +61,21 @@ def test_the_state_tells_what_the_world_holds_and_zeros_of_what_is_gone(n_reques
         assert requested == set(world.open_requests.tolist()) - {NOBODY}
         rows, *_ = env.step_arrays(decide(policy, rows, world))
     assert (world.delivered > 3, carried > 10, (~world.robot_present).sum()) == (True, True, 3)
+
+
+def test_what_may_differ_from_what_spaces_were_made_for_is_told_field_by_field() -> None:
+    env = SwarmLogisticsEnv(n_robots=3, n_items=5, max_robots=4, duration=20.0)
+    for fields in ({"n_robots": 4}, {"n_items": 5, "duration": 20.0}, {"restock": True}):
+        env.conditions_of(0, {"scenario": fields})
+    with pytest.raises(SetupError, match=r"^n_items = 4, duration = 20.5: observations or states"):
+        env.conditions_of(0, {"scenario": {"duration": 20.5, "n_items": 4}})
+    with pytest.raises(SetupError, match=r"^view_range = 3.5: observations or states could leave"):
+        env.conditions_of(0, {"scenario": {"view_range": 3.5}})
+    with pytest.raises(SetupError, match=r"^n_robots = 5: should be at most 4, .*max_robots=5 or"):
+        env.conditions_of(0, {"scenario": {"n_robots": 5}})
+    with pytest.raises(SetupError, match=r"^message_size = 2: should be the environment's own, 0,"):
+        env.declare_spaces(env.scenario.replace(message_size=2))
+    env.declare_spaces(env.scenario.replace(n_robots=6, duration=20.5))
+    env.conditions_of(0, {"scenario": {"duration": 20.5, "n_items": 4, "n_robots": 6}})
+    assert (len(env.possible_agents), env.state_space.high[-1]) == (6, 21.5)
+    assert env.state_space.shape == (6 * len(ROBOT_FEATURES) + 5 * len(ITEM_COLUMNS) + 1,)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,17 @@ def test_they_hold_every_decision_of_every_robot_that_is_there() -> None:
     assert sum(robot.failed.sum() for robot in recorded.episodes if robot.seed == 3) == 20
     rewards = max(robot.rewards.sum() for robot in recorded.episodes if robot.seed == 3)
     assert rewards == episodes[0].delivered
+    assert [(robot.seed, robot.robot) for robot in recorded.episodes[::3]] == [
+        (3, 0),
+        (3, 3),
+        (4, 2),
+    ]
+    (gone,) = (robot for robot in recorded.episodes[:4] if robot.terminated)
+    assert gone.failed.nonzero()[0].tolist() == list(range(30, 50))
+    counts = f"2 episodes, 8 robots, 1,300 decisions, P {sum(recorded.delivered) / 2:.1f}"
+    assert repr(recorded) == f"Demonstrations({HOMING!r}: {counts})"
+    empty = replace(recorded, delivered=[], episodes=[])
+    assert repr(empty).endswith(": 0 episodes, 0 robots, 0 decisions, P nan)")
 
 
 @pytest.mark.parametrize(
@@ -78,7 +90,8 @@ def test_files_hold_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     np.testing.assert_array_equal(np.stack(frame["observation"]), robot.observations[:-1])
     np.testing.assert_array_equal(np.stack(frame["action"]), robot.actions)
     assert frame["truncated"].tolist() == [False] * 19 + [True]
-    assert b"scenario" in table.schema.metadata
+    assert table.schema.metadata[b"policy"] == b"Homing()"
+    assert b'"n_robots":3' in table.schema.metadata[b"scenario"]
     # A checksum tells of a page in which a number is damaged.
     content = bytearray((tmp_path / "homing.parquet").read_bytes())
     content[content.index(np.float32(robot.observations[0, 0]).tobytes())] ^= 1
@@ -87,12 +100,32 @@ def test_files_hold_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         parquet.read_table(tmp_path / "homing.parquet", page_checksum_verification=True)
 
 
-def test_imitation_learning_takes_the_transitions() -> None:
-    recorded = record("homing", 1, scenario=SMALL, faults=["removed:1@5"])
+def test_imitation_learning_takes_the_transitions(tmp_path: Path) -> None:
+    recorded = record("homing", 1, scenario=SMALL, faults=["FM1:1@3", "removed:1@5"])
     observations, actions, following, ends = recorded.transitions()
     assert len(observations) == len(actions) == len(following) == len(ends) == 650
-    assert ends.sum() == 1
-    np.testing.assert_array_equal(observations[1], following[0])
+    robots = recorded.episodes
+    lengths = [len(robot.actions) for robot in robots]
+    leaver = lengths.index(50)
+    assert ends.nonzero()[0].tolist() == [200 * leaver + 49]
+    for rows, which in ((observations, slice(-1)), (following, slice(1, None))):
+        np.testing.assert_array_equal(rows, np.vstack([r.observations[which] for r in robots]))
+    np.testing.assert_array_equal(actions, np.vstack([robot.actions for robot in robots]))
+    parquet = pytest.importorskip("pyarrow.parquet")
+    recorded.to_parquet(tmp_path / "rows.parquet")
+    table = parquet.read_table(tmp_path / "rows.parquet").to_pydict()
+    last = np.cumsum(lengths) - 1
+    columns = {
+        "seed": [0] * 650, "robot": np.repeat(range(4), lengths),
+        "step": np.concatenate([np.arange(length) for length in lengths]),
+        "observation": observations, "action": actions, "terminated": ends,
+        "reward": np.concatenate([robot.rewards for robot in robots]),
+        "failed": np.concatenate([robot.failed for robot in robots]),
+        "truncated": np.isin(np.arange(650), np.delete(last, leaver)),
+    }  # fmt: skip
+    assert table.keys() == columns.keys()
+    for name, values in columns.items():
+        np.testing.assert_array_equal(table[name], values, name)
 
 
 def test_a_robot_that_is_never_there_has_no_episode() -> None:
@@ -101,8 +134,15 @@ def test_a_robot_that_is_never_there_has_no_episode() -> None:
 
 
 def test_a_policy_that_sees_more_than_rows_is_refused() -> None:
-    with pytest.raises(SetupError, match="policy 'central' has needs_state: should decide by"):
+    rest = (
+        "should decide by the rows of the warehouse alone, as what it does is recorded beside these"
+    )
+    with pytest.raises(SetupError, match=f"^policy 'central' has needs_state: {rest}$"):
         record("central")
+    wrapped: Any = Homing()
+    wrapped.wrap = MotionFrame
+    with pytest.raises(SetupError, match=rf"^policy Homing\(\) has wrap: {rest}$"):
+        record(wrapped)
     with pytest.raises(SetupError, match="episodes = 0"):
         record("homing", 0)
 

@@ -31,6 +31,8 @@ def vec_normalize(**attributes: Any) -> SimpleNamespace:
     [
         ((MEAN, DEVIATION), 1.0),
         ((MEAN[None], 4.0), 1.0),
+        ([MEAN, DEVIATION], 1.0),
+        (SimpleNamespace(mean=MEAN, var=DEVIATION**2), 1.0),  # statistics alone
         (lambda rows: (rows - 2.0) / 4.0, 1.0),
         (vec_normalize(), 1.0),
         (vec_normalize(clip_obs=0.5), 0.5),
@@ -42,6 +44,13 @@ def vec_normalize(**attributes: Any) -> SimpleNamespace:
 def test_rows_are_normalized_as_they_were_in_training(normalize: Any, expected: float) -> None:
     policy = policies.of(first_columns, normalize=normalize)
     assert (policy.act(np.full((2, N_COLUMNS), 6.0, np.float32)) == expected).all()
+
+
+def test_statistics_without_a_variance_have_a_little_of_one() -> None:
+    still = SimpleNamespace(mean=0.0, var=0.0)
+    policy = policies.of(first_columns, normalize=still)
+    commands = policy.act(np.full((2, N_COLUMNS), 5e-5, np.float32))
+    np.testing.assert_allclose(commands, 0.5, rtol=1e-6)
 
 
 def test_rows_of_zeros_stay_zeros_and_statistics_go_on_with_their_training() -> None:
@@ -71,6 +80,15 @@ def test_a_policy_is_known_by_its_statistics_and_their_limit() -> None:
         ((MEAN, np.ones(3)), {}, r"mean has shape \(141,\) and its deviation \(3,\)"),
         ((MEAN, np.zeros(N_COLUMNS)), {}, "should have a finite mean and a deviation above zero"),
         (("a", "b"), {}, "should be arrays of numbers, mean and standard deviation"),
+        (
+            (np.zeros((2, N_COLUMNS)), 1.0),
+            {},
+            r"mean has shape \(2, 141\) and its deviation \(\): ",
+        ),
+        *(
+            (wrong, {}, r"(?s)^normalize = .*: should be None, a function of rows, a pair \(mean, ")
+            for wrong in (3, (MEAN, DEVIATION, MEAN), np.ones((2, N_COLUMNS)), SimpleNamespace)
+        ),
         (
             vec_normalize(obs_rms={"seen": None, "goal": None}),
             {},

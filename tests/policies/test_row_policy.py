@@ -141,6 +141,11 @@ def test_its_period_is_that_of_its_loop() -> None:
     robot = Robot(load("homing"), body, 0.05, seed=0)
     assert robot.body.control_period == 0.05
     assert robot.memory["widest_turn"] == pytest.approx(0.05 * body.max_turn_rate)
+    # Of physics it has as many steps as a scenario wants, and one or more.
+    for period, n_substeps in ((0.05, 3), (0.04, 2), (0.01, 1)):
+        robot = Robot(load("homing"), body, period, seed=0)
+        assert robot.body.physics_period == pytest.approx(period / n_substeps)
+    assert Robot(load("homing"), body, 0.1, seed=0).body == body
     with pytest.raises(PolicyError, match="number = -1: should be 0 or more"):
         Robot(load("homing"), body, 0.1, seed=0, number=-1)
 

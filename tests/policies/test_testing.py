@@ -31,8 +31,25 @@ class Forgetful(SwarmDT):
         super().reset(n_robots, seed + self.episodes)
 
 
+class Forgets(SwarmDT):
+    """A copy of it lacks what it was made with."""
+
+    shift = 0
+
+    def __setstate__(self, state: Any) -> None:
+        self.__dict__ |= state | {"shift": 1}
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        super().reset(n_robots, seed + self.shift)
+
+
 class Counted(SwarmDT):
     n_acts = 0  # of any copy
+    played: Scenario
+
+    def configure(self, scenario: Scenario) -> None:
+        Counted.played = scenario
+        super().configure(scenario)
 
     def act(self, observations: Any) -> Any:
         Counted.n_acts += 1
@@ -61,6 +78,36 @@ class Counts(Wrapper):
         return rows, rewards + Counts.steps, *rest
 
 
+class Changes(Wrapper):
+    """Hands on something else from the third step on."""
+
+    steps = 0
+
+    def change(self, observations: Any) -> None: ...
+
+    def step(self, actions: Any) -> Any:
+        self.steps += 1
+        observations, *rest = super().step(actions)
+        if self.steps == 3:
+            self.change(observations)
+        return observations, *rest
+
+
+class Drops(Changes):
+    def change(self, observations: Any) -> None:
+        del observations["robot_2"]
+
+
+class Doubles(Changes):
+    def change(self, observations: Any) -> None:
+        observations["robot_2"] = observations["robot_2"].astype(np.float64)
+
+
+class Raises(Changes):
+    def change(self, observations: Any) -> None:
+        observations["robot_4"][7] = 9.0
+
+
 def test_what_the_package_has_passes() -> None:
     def make() -> Any:
         env: Any = FaultInjection(parallel_env(SMALL), "FM1", robots=2, onset=1.0)
@@ -84,8 +131,24 @@ def test_an_episode_that_ends_before_the_last_step_is_played_to_its_end() -> Non
     [
         (Magnifies, r"has .* in column \d+, and \d+ more columns: should be -?\d.* to \d"),
         (Adds, r"at step 0 has shape .*: should have .*overrides that, too$"),
-        (Counts, "another episode"),
-        (lambda _: SimpleNamespace(unwrapped=None), "should be a SwarmLogisticsEnv"),
+        (
+            Adds,
+            r"^robot_0's .* \(142,\) and type float32: .* \(141,\) and float32, as observation_spa",
+        ),
+        (Drops, "^robot_2's observation at step 3 is None: should be an array$"),
+        (Doubles, r"has shape \(141,\) and type float64: should have \(141,\) and float32, as"),
+        (
+            Raises,
+            "^robot_4's observation at step 3 has 9.0 in column 7: should be 0.0 to 2.0, as obs",
+        ),
+        (
+            Counts,
+            "^the same seed gives another episode beside another live world: they part at 1$",
+        ),
+        (
+            lambda _: SimpleNamespace(unwrapped=None),
+            r"^make\(\) = .*: should be a SwarmLogisticsEnv in parallel wrappers$",
+        ),
     ],
 )
 def test_a_broken_wrapper_is_named(wrapper: Any, sentence: str) -> None:
@@ -94,5 +157,21 @@ def test_a_broken_wrapper_is_named(wrapper: Any, sentence: str) -> None:
 
 
 def test_a_policy_that_is_not_reset_is_named() -> None:
-    with pytest.raises(testing.CheckError, match="reset should forget it"):
+    start = "^the same seed gives another episode"
+    after = f"{start} after another episode: reset should forget it: they part at 0$"
+    with pytest.raises(testing.CheckError, match=after):
         testing.check_policy(Forgetful(), SMALL, steps=60)
+    with pytest.raises(testing.CheckError, match=f"{start} with a pickled copy of the policy: "):
+        testing.check_policy(Forgets(), SMALL, steps=5)
+
+
+def test_as_many_steps_are_played_as_asked_for() -> None:
+    Counted.n_acts = 0
+    testing.check_policy(Counted(), SMALL, steps=7)
+    assert Counted.n_acts == 4 * 7
+    assert Counted.played == SMALL
+    testing.check_policy(Counted(), steps=1)
+    assert Counted.played == Scenario()
+    Counted.n_acts = 0
+    testing.check_wrapper(lambda: parallel_env(SMALL), Counted(), steps=7)
+    assert Counted.n_acts == 3 * 7

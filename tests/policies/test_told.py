@@ -87,16 +87,80 @@ def test_the_true_place_stands_in_the_robots_own_frame_behind_what_is_in_view() 
     np.testing.assert_equal(rows[0], sensed()[0])  # who sees it is told nothing
 
 
+def played(world: Warehouse, rows: np.ndarray, **who: object) -> np.ndarray:
+    """Return the rows of the script for rows of a swarm."""
+    policy = Told(**who)
+    policy.configure(world.scenario)
+    policy._script = script = Rows()  # type: ignore[assignment]
+    policy.act(rows, world.state)
+    return script.rows
+
+
+def test_rows_hold_the_item_behind_those_in_view_or_instead_of_the_last() -> None:
+    world = world_of([1.0, 2.9, 4.8, 6.7, 8.6, 9.5])
+    state = world.state
+    state.robot_heading[:] = [0.7, -2.0, 3.0, 1.0, 0.0, 0.5]
+    state.item_position[ITEM] = [3.0, 7.0]
+    state.robot_present[5] = False
+    rows = np.zeros((6, row.N_COLUMNS), np.float32)
+    n_in_view = [0, 1, 2, row.N_ITEMS_IN_VIEW - 1, row.N_ITEMS_IN_VIEW, 0]
+    for robot, count in enumerate(n_in_view):
+        for rank in range(count):
+            start = row.ITEMS + rank * row.ITEM_WIDTH
+            rows[robot, start : start + row.ITEM_WIDTH] = [1.0, 0.1 * rank, 0.2, 0.0, 1.0]
+    expected = rows.copy()
+    for robot, count in enumerate(n_in_view[:5]):
+        start = row.ITEMS + min(count, row.N_ITEMS_IN_VIEW - 1) * row.ITEM_WIDTH
+        x, y = np.array([3.0, 7.0]) - state.robot_position[robot]
+        away, angle = np.hypot(x, y), np.arctan2(y, x) - state.robot_heading[robot]
+        item = [1.0, away * np.cos(angle), away * np.sin(angle), 1.0, 0.0]
+        expected[robot, start : start + row.ITEM_WIDTH] = item
+    np.testing.assert_allclose(played(world, rows), expected, atol=1e-6)
+    state.item_status[ITEM] = 1  # somebody carries it
+    np.testing.assert_array_equal(played(world, rows), rows)
+
+
+@pytest.mark.parametrize(
+    ("who", "absent", "carrying", "robots"),
+    [
+        ({"hears": "nearest", "count": 2}, [], [], [4, 5]),
+        ({"hears": "nearest", "count": 2}, [5], [4], [2, 3]),
+        ({"hears": "nearest", "count": 4}, [], [0, 1, 2, 3], [4, 5]),
+        ({"hears": "hops", "count": 2}, [], [], [2, 3, 5]),
+        ({"hears": "hops", "count": 2}, [3], [], [5]),
+        ({"hears": "hops", "count": 2}, [4], [], []),
+        ({"hears": "hops", "count": 9}, [], [3], [0, 1, 2, 5]),
+    ],
+)
+def test_who_is_absent_or_carries_is_not_told_and_who_is_absent_passes_nothing_on(
+    who: dict[str, object], absent: list[int], carrying: list[int], robots: list[int]
+) -> None:
+    world = world_of([1.0, 2.9, 4.8, 6.7, 8.6, 9.5])
+    world.state.item_position[ITEM] = [9.5, 5.0]
+    world.state.robot_present[absent] = False
+    world.state.robot_item[carrying] = 2
+    rows = np.zeros((6, row.N_COLUMNS), np.float32)
+    if who["hears"] == "hops":  # robot 4 has it in view
+        rows[4, row.ITEMS : row.ITEMS + row.ITEM_WIDTH] = [1.0, 0.9, 0.0, 1.0, 0.0]
+    is_changed = (played(world, rows, **who) != rows).any(axis=1)
+    assert np.flatnonzero(is_changed).tolist() == robots
+
+
 def test_where_nothing_is_asked_for_it_is_the_script_itself() -> None:
-    world = Warehouse(SCENARIO)
+    scenario = SCENARIO.replace(drive="differential", handling_time=0.3)
+    world = Warehouse(scenario)
     rows = world.reset(seed=0)
-    world.state.open_requests[:] = -1
     told_script = policies.load("homing-told", near=2.0)
     script = HomingStock(near=2.0)
     for policy in (told_script, script):
-        policy.configure(SCENARIO)  # type: ignore[attr-defined]
+        policy.configure(scenario)  # type: ignore[attr-defined]
         policy.reset(6, 3)
-    np.testing.assert_equal(told_script.act(rows, world.state), script.act(rows))  # type: ignore[call-arg]
+    assert repr(told_script._script) == repr(script) == "HomingStock(near=2.0)"  # type: ignore[attr-defined]
+    for _ in range(60):
+        world.state.open_requests[:] = -1
+        commands = script.act(rows)
+        np.testing.assert_equal(told_script.act(rows, world.state), commands)  # type: ignore[call-arg]
+        rows = world.step(commands)
     with pytest.raises(PolicyError, match="state = None"):
         told_script.act(rows)
     with pytest.raises(PolicyError, match="hears"):

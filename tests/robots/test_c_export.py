@@ -302,7 +302,24 @@ def test_the_files_say_what_they_are_for(tmp_path: Path) -> None:
     assert "HomingStock(patience=8.0)" in header
     assert "#define SWARM_PERIOD 0.1f" in header
     assert f"double memory[{N_COLUMNS}];" in header
-    assert "132: carrying [flag], it carries an item" in header
+    assert header.startswith("/* HomingStock(patience=8.0), for robots of this body and control ")
+    columns = header.partition("nearest first:\n")[2].partition(" */\n")[0].splitlines()
+    assert columns[0].startswith(" *   0 to 15: range_robots [m], to robots; beam k looks k * 22.5")
+    assert columns[1:3] == [
+        " *       full range where it meets nothing",
+        " *   16 to 31: range_walls [m], to walls and obstacles",
+    ]
+    assert " *   49 to 84, every 5th: item_x [m], its centre, forward" in columns
+    assert " *   132: carrying [flag], it carries an item" in columns
+    assert columns[-1].startswith(" *   140: turn_rate [rad/s], to the left")
+    assert {"#define SWARM_ROW 141", "#define SWARM_COMMAND 4"} <= {
+        line.partition(" /*")[0] for line in header.splitlines()
+    }
+    assert '#define SWARM_STREAM "homing" /*' in header
+    assert (
+        f"int32_t count; /* of its steps */\n    double turned;\n    double memory[{N_COLUMNS}"
+        in header
+    )
     assert ".patience = 8.0f," in files.source.read_text()
     with pytest.raises(PolicyError, match="policy = Central: should be homing, homing-stock"):
         write_c(policies.load("central"), SCENARIO, tmp_path / "robot.c")

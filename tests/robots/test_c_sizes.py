@@ -43,3 +43,29 @@ def test_ziglang_writes_the_stack_where_clang_is_told_to(
     monkeypatch.setattr(c_sizes, "run_compiler", run_compiler)
     sizes = c_sizes.sizes_of(tmp_path / "robot.c", ["python", "-m", "ziglang", "cc"])
     assert str(sizes) == "ziglang -mcpu=cortex_m4: 1,234 bytes of flash, at most 40 bytes of stack"
+
+
+def test_a_compiler_of_gnu_s_has_a_size_of_its_own_and_may_say_nothing_of_the_stack(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    commands: list[list[str]] = []
+
+    def run_compiler(command: Sequence[str], path: Path) -> str:
+        commands.append([*command])
+        assert path == tmp_path / "robot.c"
+        return "text data bss dec hex filename\n1200 34 5 1239 4d7 part.o\n"
+
+    monkeypatch.setattr(c_sizes, "run_compiler", run_compiler)
+    compiler = ["/opt/arm-none-eabi-gcc", "-mthumb", "-g"]
+    sizes = c_sizes.sizes_of(tmp_path / "robot.c", compiler)
+    assert str(sizes) == "arm-none-eabi-gcc -mthumb: 1,234 bytes of flash"
+    assert sizes.stack is None
+    build, size = commands
+    *first, output, usage = build
+    assert first == [
+        *compiler, *c_sizes.WARNINGS, "-O2", "-c", str(tmp_path / "robot.c"), "-o"
+    ]  # fmt: skip
+    assert usage == "-fstack-usage"
+    assert size == ["/opt/arm-none-eabi-size", output]
+    c_sizes.sizes_of(tmp_path / "robot.c", ["/opt/clang"])
+    assert commands[-1][0] == "size"

@@ -21,8 +21,9 @@ from swarm_logistics_env.policies.learned import (
 )
 from swarm_logistics_env.policies.policy import start
 from swarm_logistics_env.robots import Contract, check_rows, contract_of
+from swarm_logistics_env.robots.contract import outputs_of
 from swarm_logistics_env.world.motion.voices import MESSAGES
-from swarm_logistics_env.world.observations import unflatten
+from swarm_logistics_env.world.observations import SENSORS, columns, unflatten
 
 NAMES = [name for name in SCRIPTED if not getattr(load(name), "needs_state", False)]
 SMALL: dict[str, Any] = {
@@ -88,6 +89,46 @@ def test_it_says_what_the_policy_reads_of_body_and_senses() -> None:
     assert "to the side" in of_taxis.outputs[1].high_means
 
 
+LINEAR, ANGULAR = "target/body/linear_velocity", "target/body/angular_velocity"
+GRIPS = "above 0.5 it closes or holds, below -0.5 it opens, else it stays as it is"
+NO_SIDE = "nothing: such a drive has no motion to the side, so it is always 0"
+
+
+def test_a_contract_says_what_each_number_of_a_command_does() -> None:
+    outputs = outputs_of(Scenario(max_speed=1.5, max_turn_rate=4.0), ["home"])
+    assert [tuple(output.model_dump().values()) for output in outputs] == [
+        ("forward", LINEAR, 0, -1.0, 1.0, "ahead at 1.5 m/s"),
+        ("left", LINEAR, 1, -1.0, 1.0, "to the left at 1.5 m/s"),
+        ("turn", ANGULAR, 2, -1.0, 1.0, "to the left at 4 rad/s"),
+        ("gripper", "", 3, -1.0, 1.0, GRIPS),
+        ("home", "", 4, 0.0, 1.0, "its radio tells its neighbours 1: it is there"),
+    ]
+    assert outputs_of(NOISY)[1].high_means == NO_SIDE
+
+
+def test_a_contract_holds_the_columns_of_a_row_and_the_parameters_of_the_policy() -> None:
+    scenario, policy = Scenario(drive="differential", control_period=0.2), load("swarm-dt")
+    contract = contract_of(policy, scenario)
+    assert contract.policy == "SwarmDT()"
+    assert contract.parameters == policy.parameters.model_dump(mode="json")  # type: ignore[attr-defined]
+    assert (contract.period, contract.frequency, contract.stream) == (0.2, 5.0, "swarm D-T")
+    assert contract.body == {"control_period": 0.2, "drive": "differential", "max_turn_rate": 6.0}
+    kinds = {part.name: part.kind for part in contract.inputs if part.kind}
+    assert kinds == {
+        "velocity": "state/body/linear_velocity", "turn_rate": "state/body/angular_velocity"
+    }  # fmt: skip
+    for part, column in zip(contract.inputs, columns(scenario), strict=True):
+        for name in ("name", "sensor", "unit", "low", "high", "absent", "meaning"):
+            assert getattr(part, name) == getattr(column, name)
+        assert part.flag == ("" if column.flag == column.name else column.flag)
+        assert part.columns == tuple(range(*column.columns.indices(contract.width)))
+    assert contract.leans_on == {
+        sensor: about
+        for sensor, about in SENSORS.items()
+        if sensor in {part.sensor for part in contract.inputs if part.used}
+    }
+
+
 def test_a_policy_that_sees_everything_has_none() -> None:
     with pytest.raises(PolicyError, match="sees the state of the whole warehouse"):
         contract_of(load("central"), Scenario())
@@ -135,7 +176,10 @@ def test_the_row_of_a_log_that_cannot_be_is_named(
     rows = log()
     check_rows(contract, rows)
     unflatten(rows, NOISY)[name][[7, 4], number] = value
-    with pytest.raises(RobotError, match=f"row 4: .*{words}"):
+    with pytest.raises(RobotError, match=f"^row 4: .*{words}"):
+        check_rows(contract, rows)
+    unflatten(rows, NOISY)["range_robots"][[4, 5], 2] = -1.0
+    with pytest.raises(RobotError, match=r"^row 4: range_robots in column 2 = -1: should be with"):
         check_rows(contract, rows)
 
 

@@ -64,8 +64,8 @@ def layer_of(*faults: Any, **fields: Any) -> FaultLayer:
 def test_a_dead_robot_stands_and_sends_nothing() -> None:
     layer = layer_of("dead:1@10")
     sensed = np.zeros(row.N_COLUMNS)
-    assert layer.driven([1.0, 0.0, 2.0, 1.0], sensed, 9.9).tolist() == [1.0, 0.0, 1.0, 1.0]
-    assert not layer.driven([1.0, 0.0, 0.0, 1.0], sensed, 10.0).any()
+    assert layer.driven([-2.0, 0.5, 2.0, 1.0], sensed, 9.9).tolist() == [-1.0, 0.5, 1.0, 1.0]
+    assert layer.driven([1.0, 0.0, 0.0, 1.0], sensed, 10.0).tolist() == [0.0] * 4
     assert layer.broadcast(3.0, [], 9.9) is not None
     assert layer.broadcast(3.0, [], 10.0) is None
 
@@ -145,6 +145,47 @@ def test_a_late_radio_sends_what_was_said_before_it_failed() -> None:
     assert timers == [0.0, 1.0, 2.0, 3.0, 4.0, 3.0, 4.0, 5.0]
 
 
+@pytest.mark.parametrize("mode", ["late", "away"])
+def test_a_late_radio_sends_no_message_of_when_the_robot_did_not_work(mode: str) -> None:
+    faults = [Fault(mode, 1, onset=1.0, duration=3.0), Fault("radio_delayed", 1, onset=0.0)]
+    layer = layer_of(*faults, control_period=1.0, message_size=1)
+    sent = [layer.broadcast(float(second), [2.0], float(second)) for second in range(7)]
+    told = [broadcast and (broadcast.timer, *broadcast.message) for broadcast in sent[1:]]
+    assert told == [None, None, None, (2.0, 0.0), (3.0, 0.0), (4.0, 1.0)]
+
+
+# Neighbours at 0.5, 1.5, 3.0 and 0.9 m: within half the view, the view or the radio.
+@pytest.mark.parametrize(
+    ("mode", "places", "timers", "words"),
+    [
+        ("FM1", [0.5, 1.5, 0.9], [5.0, 6.0, 8.0], [0.1, 0.2, 0.4]),
+        ("FM3_hear", [0.5, 1.5, 0.9], [90.0] * 3, [0.0] * 3),
+        ("view_reduced", [0.5, 0.9], [5.0, 8.0], [0.1, 0.4]),
+        ("dead", [], [], []),
+    ],
+)
+def test_neighbours_that_are_neither_seen_nor_heard_go_with_their_messages(
+    mode: str, places: list[float], timers: list[float], words: list[float]
+) -> None:
+    swarm = {"view_range": 2.0, "radio_range": 1.2, "timer_limit": 90.0, "message_size": 1}
+    sensed = np.zeros(row.N_COLUMNS + row.N_NEIGHBOURS, np.float32)
+    neighbours = sensed[row.NEIGHBOURS : row.LOWEST_TIMER].reshape(row.N_NEIGHBOURS, -1)
+    for index, place in enumerate((0.5, 1.5, 3.0, 0.9)):
+        neighbours[index] = 1.0, 0.0, place, 1.0, 5.0 + index
+        sensed[row.MESSAGES + index] = 0.1 + 0.1 * index
+    sensed[row.LOWEST_TIMER : row.CARRYING] = 5.0, 0.0, 0.5, 1.0
+    expected = np.zeros_like(sensed)
+    hears = mode not in ("FM3_hear", "dead")
+    block = expected[row.NEIGHBOURS : row.LOWEST_TIMER].reshape(row.N_NEIGHBOURS, -1)
+    for index, (place, timer) in enumerate(zip(places, timers, strict=True)):
+        block[index] = 1.0, 0.0, place, hears, timer
+    expected[row.MESSAGES : row.MESSAGES + len(words)] = words
+    expected[row.LOWEST_TIMER : row.CARRYING] = sensed[row.LOWEST_TIMER : row.CARRYING] * hears
+    expected[: row.ITEMS] = 4.0 * (mode == "dead")
+    layer = layer_of(f"{mode}:1@10", ranger_range=4.0, **swarm)
+    np.testing.assert_allclose(layer.sensed(sensed, 10.0), expected, atol=1e-6)
+
+
 def test_a_radio_of_random_words_says_others_in_each_period() -> None:
     layer = layer_of("message_random:1@1", control_period=1.0, message_size=2)
     sent = [layer.broadcast(3.0, [0.5, 0.5], float(second)) for second in range(100)]
@@ -175,6 +216,12 @@ def test_trials_of_robots_are_a_table_that_judge_reads(tmp_path: Path) -> None:
     for seed, (sound, broken) in enumerate([(20, 15), (22, 16), (19, 12)]):
         append_trial(path, [], swarm, seed, sound)
         append_trial(path, ["FM4:2@30"], swarm, seed, broken)
+    append_trial(path, [Fault("FM1", (1, 4, 7), onset=2.5)], swarm, 3, 7.5)
+    lines = path.read_text().splitlines()
+    assert lines[:3] == [
+        "seed,robots,fault,faulty,onset,delivered", "0,12,none,0,,20", "0,12,FM4,2,30.0,15"
+    ]  # fmt: skip
+    assert lines[-1] == "3,12,FM1,3,2.5,7.5"
     trials = read_trials(path)
     assert trials.performance(fault="FM4", faulty=2).tolist() == [15, 16, 12]
     assert trials.performance(faulty=0).tolist() == [20, 22, 19]
@@ -187,5 +234,36 @@ def test_a_fault_by_role_or_of_a_battery_and_a_robot_that_is_not_there_are_refus
         layer_of("FM4:1:carrier")
     with pytest.raises(FaultError, match="mode = cell_fades: should be another, no layer weakens"):
         layer_of("motor_slow:1", "cell_fades:1", battery=1000.0)
-    with pytest.raises(FaultError, match="number = 1: robots are 0 to 0"):
-        FaultLayer([], Scenario(n_robots=1), number=1, seed=0)
+    for number in (-1, 3):
+        with pytest.raises(FaultError, match=f"number = {number}: robots are 0 to 2"):
+            FaultLayer([], Scenario(n_robots=3), number=number, seed=0)
+
+
+def test_modes_hold_from_their_onset_to_their_end_for_the_robots_that_they_strike() -> None:
+    faults = [Fault("FM4", (0, 2), onset=5.0, duration=2.0), Fault("motor_slow", (0,), onset=6.0)]
+    layers = [FaultLayer(faults, Scenario(n_robots=3), number, seed=0) for number in range(3)]
+    modes = [[layer.modes(time) for layer in layers] for time in (4.9, 5.0, 6.5, 7.0)]
+    assert modes == [
+        [(), (), ()],
+        [("FM4",), (), ("FM4",)],
+        [("FM4", "motor_slow"), (), ("FM4",)],
+        [("motor_slow",), (), ()],
+    ]
+    assert [layer.counts(6.0) for layer in layers] == [False, True, False]
+
+
+def test_rangers_that_are_biased_or_frozen_report_this_of_what_they_meet() -> None:
+    layer = layer_of("rangers_biased:1@1+1", "rangers_frozen:1@3+2", ranger_range=2.0)
+    beams = np.array([0.5, 1.9, 2.0], np.float32)
+    sensed = []
+    for time in (0.0, 1.0, 2.0, 3.0, 4.0, 5.0):
+        row_at = np.zeros(row.N_COLUMNS, np.float32)
+        row_at[:3] = np.minimum(beams + 0.01 * time * (beams < 2.0), 2.0)
+        sensed.append(layer.sensed(row_at, time)[:3].tolist())
+    assert sensed == [
+        pytest.approx(expected)
+        for expected in (
+            [0.5, 1.9, 2.0], [0.71, 2.0, 2.0], [0.52, 1.92, 2.0],
+            [0.53, 1.93, 2.0], [0.53, 1.93, 2.0], [0.55, 1.95, 2.0],
+        )
+    ]  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 
 from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.core.errors import PolicyError, RobotError
+from swarm_logistics_env.policies.files import write_policy
+from swarm_logistics_env.policies.learned import Network, PolicyCard, tensor_shapes
 from swarm_logistics_env.policies.row_policy import Robot
 from swarm_logistics_env.robots.middleware import (
     Link,
@@ -81,6 +84,13 @@ def test_losses_hit_rows_and_commands_as_often_as_said_and_nothing_goes_back_in_
     assert not answered(Middleware(loss=1.0), 5).any()
 
 
+def test_each_way_takes_up_to_the_jitter_longer() -> None:
+    rows = answered(Middleware(jitter=0.3, stop_after=50), 400).astype(np.int64)
+    late = (np.arange(1, 401)[:, np.newaxis] - rows)[10:]
+    assert (late.min(), late.max()) == (1, 6)  # of periods of 0.1 s
+    assert late.mean() == pytest.approx(3.3, abs=0.2)
+
+
 def test_what_is_lost_does_not_depend_on_other_settings_or_on_other_robots() -> None:
     losses = answered(Middleware(loss=0.3, stop_after=50), 100)
     more = answered(Middleware(loss=0.5, stop_after=50), 100)
@@ -112,14 +122,44 @@ def test_a_robot_whose_rows_are_lost_decides_once_for_each_period() -> None:
         np.testing.assert_array_equal(command, commands[-1])
 
 
+def test_it_decides_on_a_row_once_for_each_period_that_it_may_catch_up_with() -> None:
+    class Counting:
+        n_steps = 0
+
+        def step(self, row: Any) -> Any:
+            self.n_steps += 1
+            return [row, self.n_steps]
+
+    late: Any = RobotOverMiddleware(Counting(), stop_after=5)  # type: ignore[arg-type]
+    steps = [late.step("row", n_periods) for n_periods in (7, 3, 99, 6, 1, 0)]
+    assert steps == [["row", total] for total in (1, 4, 10, 16, 17, 18)]
+
+
+def test_nobody_is_steered_before_an_episode_begins() -> None:
+    assert OverMiddleware("homing").act(np.zeros((0, 141), np.float32)).shape == (0, 4)
+
+
 def test_it_tells_its_policy_and_what_is_set() -> None:
     assert repr(OverMiddleware("homing")) == "OverMiddleware('homing')"
     settings = repr(OverMiddleware("homing", delay=0.05, loss=0.1))
     assert settings == "OverMiddleware('homing', loss=0.1, delay=0.05)"
 
 
-def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(RobotError, match="loss"):
-        OverMiddleware("homing", loss=1.5)
+@pytest.mark.parametrize(
+    "setting", ["loss=1.5", "loss=-0.1", "delay=-0.1", "jitter=-0.1", "delay=inf", "stop_after=0"]
+)
+def test_a_setting_that_cannot_be_is_refused(setting: str) -> None:
+    name, number = setting.split("=")
+    with pytest.raises(RobotError, match=f"Middleware.{name} = "):
+        OverMiddleware("homing", **{name: float(number)})
+
+
+def test_a_policy_that_sees_everything_or_talks_is_refused(tmp_path: Path) -> None:
+    network = Network(hidden=(4,), talks=True)
+    tensors = {name: np.zeros(shape, np.float32) for name, shape in tensor_shapes(network).items()}
+    path = tmp_path / "talking.safetensors"
+    write_policy(path, PolicyCard(name="talking", network=network), tensors)
+    with pytest.raises(PolicyError, match="and middleware carries no messages"):
+        OverMiddleware(str(path))
     with pytest.raises(PolicyError, match="sees the state of the whole warehouse"):
         OverMiddleware("central")

@@ -55,6 +55,16 @@ def test_a_unit_as_large_or_small_as_is_taken_changes_no_indicator(
         assert getattr(scaled, name) == pytest.approx(getattr(usual, name), rel=1e-9)
 
 
+def test_the_largest_and_the_least_performances_are_taken_and_so_are_zeros() -> None:
+    for most in (1e60, 1e-60, 0.0):
+        assert spi.mean_interval([0.0, most]).value == most / 2
+    for count in (1, np.int64(3)):
+        assert spi.robustness([40.0, 41], [39.0, 40], n=25, m=count).threshold == 0.0
+    for wrong in ({"threshold": np.inf}, {"confidence": 0.0}, {"confidence": "0.9"}):
+        with pytest.raises(spi.IndicatorError, match=f"^{next(iter(wrong))} = "):
+            spi.relative_change([40.0, 41], [39.0, 40], **wrong)
+
+
 def test_times_and_events_are_read_the_same_way() -> None:
     with pytest.raises(spi.IndicatorError, match=r"times is of times"):
         spi.median_interval(np.array([1, 2, 3], dtype="m8[s]"))

@@ -17,6 +17,7 @@ def test_holm_by_hand() -> None:
     assert spi.holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
     assert spi.holm([0.6, 0.5]) == pytest.approx([1.0, 1.0])
     assert spi.holm([]).size == 0
+    assert spi.holm([0.0, 1.0, 0.2]).tolist() == pytest.approx([0.0, 1.0, 0.4])
 
 
 def estimate(p_value: float | None, probability: float | None = None, **more: Any) -> spi.Estimate:
@@ -35,6 +36,12 @@ def test_adjusted_verdicts_keep_their_direction_and_what_is_untested_counts() ->
     family = [estimate(0.001, 0.9995), estimate(0.02, 0.01), estimate(0.03, 0.985)]
     assert spi.adjust(family) == ("supported", "refuted", "supported")
     assert spi.adjust([*family, estimate(None)]) == ("supported", *["open"] * 3)
+
+
+def test_a_p_of_just_the_error_decides_nothing() -> None:
+    error = 1.0 - 0.95
+    at_it, below_it = estimate(error, 0.9), estimate(0.99 * error, 0.9)
+    assert (at_it.verdict, below_it.verdict) == ("open", "supported")
 
 
 def test_identical_runs_stand_outside_the_family() -> None:
@@ -70,6 +77,9 @@ def test_looks_keep_the_error_that_peeking_inflates() -> None:
     # Alpha is spent in proportion to the seeds.
     assert crossed == pytest.approx(0.05 * np.array(looks) / 20, abs=0.002)
     assert alphas[0] == pytest.approx(0.05 * 5 / 20)  # nothing is spent before
+    assert alphas == pytest.approx((0.0125, 0.02082155, 0.02961274), rel=1e-6)
+    four = spi.look_alphas((10, 20, 40, 60), alpha=0.1)
+    assert four == pytest.approx((0.1 / 6, 0.02180381, 0.04381398, 0.05895257), rel=1e-6)
     assert spi.look_alphas([20], alpha=0.1) == pytest.approx((0.1,))
     assert spi.look_alphas((1, 2), alpha=1e-30)[0] < 1e-15  # beyond the grid
 
@@ -83,7 +93,11 @@ def test_looks_keep_the_error_that_peeking_inflates() -> None:
         (spi.fault_budget, {}, "is empty"),
         (spi.fault_budget, {0: ROBUST}, "m = 0"),
         (spi.fault_budget, {1: spi.relative_change(P_O, P_O)}, "indicator at m = 1 is change"),
+        (spi.holm, [[0.5]], "p_values"),
         (spi.look_alphas, (20, 10), "looks"),
+        (spi.look_alphas, (20, 20), "looks"),
+        (spi.look_alphas, (), "looks"),
+        (spi.look_alphas, (0, 10), "look = 0: should be at least 1"),
         (lambda alpha: spi.look_alphas((10,), alpha=alpha), 5, "alpha = 5"),
     ],
 )

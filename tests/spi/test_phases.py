@@ -47,6 +47,31 @@ def test_two_phases_are_named_with_the_p_between_them() -> None:
     assert phases.p_value < 1e-3
 
 
+@pytest.mark.parametrize(
+    ("runs", "p_value", "boundary", "share_low"),
+    [
+        ([*range(10, 20), *range(40, 50)], 2 / 2_001, 29.5, 0.5),
+        ([*range(10, 20), *[40, 41] * 5], 2 / 2_001, 29.3, 0.5),
+        ([80 - 0.1 * k for k in range(40)] + [20, 21, 22, 90], 0.276143, None, 0.0),
+        (
+            [80 - 0.1 * k for k in range(40)] + [20, 21, 22, 23, 24, 25, 90],
+            0.00487566,
+            72.4625,
+            6 / 47,
+        ),
+        ([38, 40, 41, 41, 42, 43, 44, 44, 45, 46, 47, 48, 50, 52, 55], 1.0, None, 0.0),
+    ],
+)
+def test_of_these_runs_phases_are_told_by_these_numbers(
+    runs: list[float], p_value: float, boundary: float | None, share_low: float
+) -> None:
+    phases = spi.two_phases(runs)
+    assert phases.p_value == pytest.approx(p_value, rel=1e-3)
+    assert phases.boundary == pytest.approx(boundary)
+    assert phases.share_low == pytest.approx(share_low)
+    assert not phases.untestable
+
+
 def test_a_phase_that_lost_less_than_a_quarter_has_not_collapsed() -> None:
     rng = np.random.default_rng(0)
     slower = np.concatenate([rng.normal(80, 2, 30), rng.normal(100, 2, 30)])
@@ -118,8 +143,15 @@ def test_the_critical_size_lies_where_half_collapse() -> None:
     assert size.low is not None
     assert size.high is not None
     assert (size.low, size.high) == pytest.approx((17.34, 22.91), abs=0.02)
+    six = spi.critical_size([10, 14, 20, 28, 40, 60], [0, 1, 3, 20, 29, 30], [30] * 6, 0.8)
+    assert six == pytest.approx((25.83881, 22.77087, 29.38953), rel=1e-5)
+    # Half may never collapse where the share rises as slowly as this, or sizes are so few.
+    scattered = spi.critical_size([10, 14, 20, 28, 40], [3, 12, 9, 25, 28], [30] * 5)
+    assert scattered == pytest.approx((24.04182, 0.0, math.inf), rel=1e-5)
+    assert spi.critical_size([10, 20, 40], [1, 15, 29], [30] * 3)[1:] == (0.0, math.inf)
     # Where few of the runs collapse at every size, nothing bounds it.
     assert spi.critical_size([10, 20], [0, 3], [30, 30])[1:] == (0.0, math.inf)
-    for counts in ([0, 0], [30, 30]):
+    assert spi.critical_size([10, 20], [0, 1], [30, 30])[1:] == (0.0, math.inf)
+    for counts in ([0, 0], [30, 30], [15]):
         with pytest.raises(spi.IndicatorError, match="should be some of the runs, not all"):
-            spi.critical_size([10, 20], counts, [30, 30])
+            spi.critical_size([10, 20][: len(counts)], counts, [30, 30][: len(counts)])

@@ -15,6 +15,7 @@ from scipy.stats import multivariate_normal
 from swarm_logistics_env import Fault, Scenario
 from swarm_logistics_env.core import progress_bar
 from swarm_logistics_env.core.errors import SetupError, StudyError
+from swarm_logistics_env.spi import robustness
 from swarm_logistics_env.study.attack import (
     _NOISES,
     STORE,
@@ -93,8 +94,13 @@ def test_a_search_that_was_stopped_goes_on_ends_alike_and_tells_how_far_it_is(
 def test_what_cannot_be_searched_is_refused(tmp_path: Path) -> None:
     short = SCENARIO.replace(duration=0.5)
     for settings, reason in (
-        (Attack("swarm-dt", SCENARIO, modes=("FM9",)), "no mode 'FM9'"),
-        (Attack("swarm-dt", SCENARIO, robots=6), "robots = 6"),
+        (
+            Attack("swarm-dt", SCENARIO, modes=("FM9",)),
+            "^modes: no mode 'FM9' to search; did you mean",
+        ),
+        (Attack("swarm-dt", SCENARIO, modes=("removed",)), "^modes: no mode 'removed' to search"),
+        (Attack("swarm-dt", SCENARIO, robots=6), "^robots = 6: should be 1 to 5$"),
+        (Attack("swarm-dt", SCENARIO, robots=0), "^robots = 0: should be 1 to 5$"),
         (Attack("swarm-dt", short, budget=10, fresh=3), "delivers nothing without faults"),
     ):
         with pytest.raises(SetupError, match=reason):
@@ -166,6 +172,23 @@ def test_what_was_never_tried_is_not_named() -> None:
         assert tried == [worst]
 
 
+def test_a_quarter_of_the_budget_is_tried_at_random_and_the_rest_in_eight_rounds() -> None:
+    faults = Attack("swarm-dt", SCENARIO, modes=("FM1", "FM4")).faults()
+    rounds: list[Sequence[tuple[int, int]]] = []
+
+    def play(pairs: Sequence[tuple[int, int]]) -> list[float]:
+        rounds.append(pairs)
+        return [float(index % 7) for index, _ in pairs]
+
+    worst, tried = search(faults, play, 60, 0)
+    assert [*map(len, rounds)] == [15, 6, 5, 6, 6, 5, 6, 5, 6]
+    runs = [pair for pairs in rounds for pair in pairs]
+    # Each run of a fault is of the next seed.
+    assert runs == [(index, tried[:k].count(index)) for k, index in enumerate(tried)]
+    assert len({index for index, _ in rounds[0]}) == 15
+    assert worst % 7 == 0
+
+
 def test_each_run_is_measured_against_that_of_its_seed_without_a_fault(tmp_path: Path) -> None:
     costs = {"FM1": 4, "FM2": 10, "FM3": 6, "FM4": 8}
 
@@ -174,8 +197,19 @@ def test_each_run_is_measured_against_that_of_its_seed_without_a_fault(tmp_path:
             cost = sum(costs[fault.mode] for fault in run.case.faults)
             yield run, delivered(20 + 200 * (run.seed % 3 == 1) - cost, digest=run.key)
 
-    result = attack(Attack("swarm-dt", SCENARIO, modes=tuple(costs), budget=40), engine, tmp_path)
-    assert [worst.fault.mode for worst in result.found] == ["FM2", "FM2"]
+    settings = Attack("swarm-dt", SCENARIO, modes=tuple(costs), budget=40)
+    result = attack(settings, engine, tmp_path)
+    fresh = np.array([20.0 + 200.0 * (seed % 3 == 1) for seed in range(40, 70)])
+    expected = robustness(fresh, fresh - 10.0, n=6, m=2, saturated=[], identical=False)
+    by_search, by_name = result.found
+    assert by_search == ("search", by_search.fault, expected, 40)
+    assert by_name == ("named modes", Fault("FM2", 2), expected, 20)
+    assert (by_search.fault.mode, by_search.fault.robots) == ("FM2", 2)
+    assert (result.searched, result.is_capped) == (len(settings.faults()), False)
+    with Runs(tmp_path / STORE) as runs:
+        rows = runs.frame().to_dict("records")
+    played = {row["faults"] for row in rows if row["seed"] == 0} - {"[]"}  # with four by name
+    assert len(played) - 4 <= result.tried <= len(played)
 
 
 def test_changes_are_estimated_with_the_noise_under_which_the_runs_are_likeliest() -> None:

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from swarm_logistics_env.core import progress_bar
 from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.study import studies
@@ -24,15 +26,17 @@ from swarm_logistics_env.study.questions.declaration import Declaration
 from swarm_logistics_env.study.questions.plan import Plan
 from swarm_logistics_env.study.report.document import document
 from swarm_logistics_env.study.report.write import markdown
+from swarm_logistics_env.study.runs.engines import Shard
 from swarm_logistics_env.study.runs.notes import note
 from swarm_logistics_env.study.runs.recorded import RecordedStudy
 from swarm_logistics_env.study.runs.store import FILE_NAME, Runs
+from swarm_logistics_env.study.runs.worker_processes import Played
 from swarm_logistics_env.study.studies import Study
-from swarm_logistics_env.study.tasks.task import Outcomes
+from swarm_logistics_env.study.tasks.task import Outcomes, Run
 from swarm_logistics_env.study.trials import read_trials
 from swarm_logistics_env.study.verdicts.until_clear import Judged, LatestLook, latest_look
 from tests.conftest import SMALL
-from tests.made_up import alter, digest
+from tests.made_up import alter, delivered, digest
 from tests.study.verdicts.test_until_clear import Engine, until_clear
 
 DYING = """
@@ -312,6 +316,46 @@ def test_the_same_outcomes_are_looked_at_once(monkeypatch: pytest.MonkeyPatch) -
 def test_it_says_where_its_runs_are(tmp_path: Path) -> None:
     assert repr(Study(name="mine", seeds=2)) == "Study('mine', in memory)"
     assert repr(Study(name="mine", seeds=2, out=tmp_path)) == f"Study('mine', in {tmp_path})"
+
+
+def test_a_notebook_shows_what_is_asked_and_how_much_of_it_is_played() -> None:
+    def engine(runs: Iterable[Run]) -> Played:
+        for run in runs:
+            yield run, delivered(run.case.scenario.n_robots)
+
+    asked: dict[str, Any] = {"policies": ["homing", "swarm-dt"], "sizes": [{"values": [2, 4]}]}
+    study = Study(name="mine", seeds=2, **asked)
+    words = (
+        "mine: 2 questions; 4 conditions x 2 seeds = 8 runs; homing, swarm-dt; {} of 8 runs done"
+    )
+    head = "<b>Study(&#x27;mine&#x27;, in memory)</b><br>"
+    assert study._repr_html_() == head + words.format(0)
+    tally = study.run(engine, shard=Shard(1, 2))
+    assert (tally.played, tally.failed, tally.kept, tally.left, tally.gave_up) == (
+        4,
+        0,
+        0,
+        0,
+        False,
+    )
+    assert study._repr_html_() == head + words.format(4)
+    assert [study.finished(Shard(number, 2)) for number in (1, 2)] == [(4, 4), (0, 4)]
+    tally = study.run(engine)
+    assert (tally.played, tally.kept, tally.changes) == (4, 4, ())
+    assert study.results()["delivered"].tolist().count(2) == 4
+    with pytest.raises(StudyError, match=r"^shard: should not be with until_clear, where all runs"):
+        Study(until_clear=True, **asked).run(engine, shard=Shard(1, 2))
+
+
+def test_until_it_is_clear_a_study_counts_its_next_look_and_all_that_may_follow(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(progress_bar, "LINE_EVERY", 0.0)
+    study = until_clear(30)
+    assert study.finished() == (0, 120)
+    study.run(Engine(most=4))
+    assert study.finished() == (4, 40)  # also what no other comparison shares
+    assert capsys.readouterr().err.startswith("study: 1 of 120 runs at most, ")
 
 
 def test_what_was_never_run_has_no_results_and_makes_no_store(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from swarm_logistics_env.train.learner import make_learner, read_checkpoint, sav
 from swarm_logistics_env.train.privileged import PRIVILEGED
 from swarm_logistics_env.train.settings import PPOSettings
 from swarm_logistics_env.train.training_worlds import NetworkView
+from swarm_logistics_env.world.motion.classes import GROUPS, outputs_of
 from swarm_logistics_env.world.motion.frame import OUTPUTS
 from swarm_logistics_env.world.motion.network_inputs import INPUTS
 from swarm_logistics_env.world.motion.voices import N_MESSAGES
@@ -95,6 +96,46 @@ def test_what_a_network_tells_is_learned_from_what_is_so_and_is_told_without_noi
     torch.testing.assert_close(judged[2], bare[2] - 0.3 * error)
 
 
+@pytest.mark.parametrize("head", ["outputs", "classes"])
+def test_probabilities_entropies_and_errors_are_those_of_torchs_distributions(
+    small: Any, head: Any
+) -> None:
+    network = Network(hidden=(8,), head=head, exploration=0.5)
+    training = small(network=network)
+    policy = make_learner(NetworkView(training), network, training.ppo, 0, "cpu").policy
+    columns = torch.randn(50, len(INPUTS) + len(PRIVILEGED))
+    with torch.no_grad():
+        for parameter in policy.parameters():
+            parameter.add_(0.3 * torch.randn_like(parameter))
+        actions, _, log_probability = policy(columns)
+        judged = policy.evaluate_actions(columns, actions)
+        answers = policy.answers_of(columns[:, : len(INPUTS)])
+        errors = policy.error(answers, actions)
+        loss = policy.imitation_loss(columns[:, : len(INPUTS)], actions)
+    kinds: list[Any]
+    if head == "outputs":
+        kinds = [torch.distributions.Normal(answers, policy.log_std.exp())]
+        expected = kinds[0].log_prob(actions).sum(dim=1)
+        entropies = kinds[0].entropy().sum(dim=1)
+        differences = ((answers - actions) ** 2).mean(dim=1)
+        likeliest = answers.numpy()
+    else:
+        logits = answers.split(GROUPS, dim=1)
+        kinds = [torch.distributions.Categorical(logits=group / 0.5) for group in logits]
+        expected = sum(kind.log_prob(actions[:, n]) for n, kind in enumerate(kinds))
+        entropies = sum(kind.entropy() for kind in kinds)
+        differences = sum(
+            torch.nn.functional.cross_entropy(group, actions[:, n], reduction="none")
+            for n, group in enumerate(logits)
+        )
+        likeliest = outputs_of(np.stack([group.argmax(dim=1) for group in logits], axis=1))
+    torch.testing.assert_close(log_probability, expected)
+    torch.testing.assert_close(judged[1:], (expected, entropies))
+    torch.testing.assert_close(errors, differences)
+    torch.testing.assert_close(loss, differences.mean())
+    np.testing.assert_array_equal(policy.likeliest_outputs(answers), likeliest)
+
+
 def test_a_checkpoint_of_another_version_of_a_library_is_refused_with_the_reason(
     small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -111,10 +152,14 @@ def test_a_checkpoint_of_another_version_of_a_library_is_refused_with_the_reason
 
 
 @pytest.mark.parametrize(("exploration", "temperature"), [(0.0, 1.0), (0.5, 0.5)])
-def test_classes_are_drawn_at_the_temperature_of_the_file_or_at_1(
+def test_classes_are_drawn_at_the_temperature_of_the_file_or_at_1_and_drive_ahead_at_first(
     small: Any, exploration: float, temperature: float
 ) -> None:
     network = Network(hidden=(8,), head="classes", exploration=exploration)
     training = small(network=network)
     policy = make_learner(NetworkView(training), network, training.ppo, 0, "cpu").policy
     assert policy.temperature == temperature
+    with torch.no_grad():
+        first = policy.answers_of(torch.zeros(1, len(INPUTS)))
+    assert first[first != 0.0].tolist() == [3.0, 3.0]  # of the direction and the speed
+    assert policy.likeliest_outputs(first)[0, :2].tolist() == pytest.approx([0.75, 0.0])

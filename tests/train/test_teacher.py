@@ -20,9 +20,10 @@ from swarm_logistics_env import policies
 from swarm_logistics_env.core.streams import generator
 from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.policies.policy import one_thread
-from swarm_logistics_env.train import training_callback
+from swarm_logistics_env.train import imitation, training_callback
 from swarm_logistics_env.train.imitation import imitate
 from swarm_logistics_env.train.learner import make_learner, tensors_of
+from swarm_logistics_env.train.teacher import Teacher
 from swarm_logistics_env.train.trainer import train
 from swarm_logistics_env.train.training_callback import TrainingLog
 from swarm_logistics_env.train.training_worlds import NetworkView
@@ -116,9 +117,96 @@ def test_the_network_comes_to_say_what_the_teacher_says_and_the_critic_warms_up_
         imitate(training, learner, TrainingLog(), generator(training.seed, "imitation"))
     assert (errors() < 0.8 * before).all()
     imitated = {name: tensor.tobytes() for name, tensor in tensors_of(learner.policy).items()}
-    shorter = training.replace(agent_steps=320)
+    shorter = training.replace(agent_steps=480)  # three updates, the last at a rate of 0
     assert weights(train(shorter, tmp_path / "warm")) == imitated
     assert weights(train(training, tmp_path / "on")) != imitated
+
+
+def test_the_teachers_share_falls_evenly_and_the_rate_in_the_last_quarter(
+    small: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    teacher = {"policy": "homing", "decisions": 2000, "rate": 0.03, "epochs": 15, "noise": 0.2}
+    training = small(network=CLASSES, teacher=teacher)
+    learner = make_learner(NetworkView(training), CLASSES, training.ppo, training.seed, "cpu")
+    collected: list[Any] = []
+    rates: list[float] = []
+
+    def collect(_: Any, columns: Any, share: float, noise: float, *rest: Any) -> Any:
+        _, rows, labels = rest
+        rows[:], labels[:] = 0.0, 0.0
+        collected.append((share, noise, len(rows), len(labels)))
+        return columns
+
+    def step(optimizer: Any) -> None:
+        rates.append(optimizer.param_groups[0]["lr"])
+
+    monkeypatch.setattr(imitation, "_collect", collect)
+    monkeypatch.setattr(torch.optim.Adam, "step", step)
+    imitate(training, learner, TrainingLog(), generator(0, "imitation"))
+    # 12 rounds of 21 steps of 8 rows; each round learns from 15 times as many, 1024 at once.
+    shares, *others = zip(*collected, strict=True)
+    assert shares == pytest.approx(np.linspace(1.0, 0.3, 12))
+    assert [set(numbers) for numbers in others] == [{0.2}, {21 * 8}, {21 * 8}]
+    assert rates == pytest.approx([0.03] * 9 * 2 + [0.012] * 3 * 2)
+
+
+def test_what_robots_do_while_a_network_imitates_has_noise_and_they_tell_what_it_tells(
+    small: Any,
+) -> None:
+    teacher = {"policy": "homing", "decisions": 1, "shares": [1.0, 1.0], "noise": 0.4}
+    scenario = small().scenario.replace(message_size=N_MESSAGES)
+    training = small(network=TALKING, scenario=scenario, teacher=teacher)
+    learner = make_learner(NetworkView(training), TALKING, training.ppo, training.seed, "cpu")
+    view = learner.env
+    columns: list[Any] = []
+    steps: list[tuple[Any, Any, Any]] = []  # of each decision: outputs, advice and messages
+
+    def reset() -> Any:
+        columns.append(type(view).reset(view))
+        return columns[-1]
+
+    def give_outputs(outputs: Any) -> None:
+        inputs = torch.from_numpy(columns[0][:, : TALKING.widths[0]])
+        steps.append((outputs.copy(), view.advice.copy(), learner.policy.messages_of(inputs)))
+        type(view).give_outputs(view, outputs)
+
+    def step_wait() -> Any:
+        stepped = type(view).step_wait(view)
+        sent.append(np.vstack([w.warehouse.state.robot_message for w in view.venv.worlds]))
+        return stepped
+
+    sent: list[Any] = []
+    view.reset, view.give_outputs, view.step_wait = reset, give_outputs, step_wait
+    imitate(training, learner, TrainingLog(), generator(0, "imitation"))
+    assert len(steps) == 12  # one a round
+    outputs, advice, messages = steps[0]
+    rng = generator(0, "imitation")
+    rng.random(training.rows)
+    noise = [0.4, 0.4, 0.2] * rng.standard_normal((training.rows, 3))
+    np.testing.assert_allclose(outputs, advice + noise)
+    np.testing.assert_allclose(sent[0], messages, atol=1e-6)
+    assert messages.any()
+
+
+def test_a_teacher_begins_anew_where_an_episode_ends_and_nowhere_else(
+    small: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kinds = [{"n_robots": 3, "scenario": {"duration": 2.0}}, {"n_robots": 5}]
+    view = NetworkView(small(worlds=kinds, teacher={"policy": "homing"}))
+    begun: list[tuple[int, float, int]] = []
+
+    def begin(teacher: Any, world: int, scenario: Any, keys: Any) -> None:
+        begun.append((world, scenario.duration, len(keys)))
+        begin_as_usual(teacher, world, scenario, keys)
+
+    begin_as_usual = Teacher.begin
+    monkeypatch.setattr(Teacher, "begin", begin)
+    view.seed(0)
+    view.reset()
+    assert begun == [(0, 2.0, 3), (1, 6.0, 5)]
+    for _ in range(60):
+        view.step(np.zeros((8, 3), np.float32))
+    assert begun[2:] == [(0, 2.0, 3)] * 3 + [(1, 6.0, 5)]
 
 
 def test_robots_do_what_the_network_says_where_the_teacher_has_no_share(small: Any) -> None:

@@ -6,8 +6,16 @@ from typing import Any
 import pytest
 
 from swarm_logistics_env.core.errors import TrainingError
+from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.train import Training, load_training, preset_names
-from swarm_logistics_env.train.settings import PPOSettings
+from swarm_logistics_env.train.settings import (
+    Conditions,
+    Indicators,
+    Part,
+    PPOSettings,
+    Teaching,
+    WorldKind,
+)
 
 
 @pytest.mark.unmeasured
@@ -19,12 +27,46 @@ def test_every_preset_can_be(name: str) -> None:
     assert training.about
 
 
+DEFAULTS: tuple[tuple[Part, dict[str, object]], ...] = (
+    (
+        Conditions(),
+        {"weight": 1.0, "modes": (), "robots": (1, 2, 3), "onset": (0.0, 0.0), "scenario": {}},
+    ),
+    (WorldKind(), {"count": 1, "n_robots": 25, "scenario": {}, "conditions": ()}),
+    (
+        Indicators(weights={"P": 1.0}, references=9.0),
+        {"weights": {"P": 1.0}, "references": 9.0, "credit": "team", "constant": True},
+    ),
+    (
+        Teaching(policy=PolicySpec.of("homing")),
+        {
+            "policy": PolicySpec.of("homing"), "decisions": 1_000_000, "shares": (1.0, 0.3),
+            "noise": 0.15, "rate": 1e-3, "epochs": 10, "warm_up": 10, "pull": 0.0,
+            "pull_until": 1.0,
+        },
+    ),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("part", "fields"), DEFAULTS)
+def test_what_a_table_of_a_training_does_not_say_is_so(
+    part: Part, fields: dict[str, object]
+) -> None:
+    assert {name: getattr(part, name) for name in type(part).model_fields} == fields
+
+
 def test_rates_begin_anew_and_rewards_change_until_their_share_of_the_training() -> None:
     ppo = PPOSettings(
         learning_rate=0.5, final_learning_rate=0.1, restarts=((0.5, 0.3), (0.75, 0.2))
     )
     rates = [ppo.rate(done) for done in (0.0, 0.25, 0.5, 0.625, 0.75, 1.0, 1.01)]
     assert rates == pytest.approx([0.5, 0.3, 0.3, 0.2, 0.2, 0.1, 0.1])
+    ppo = PPOSettings(least_deviation=(0.4, 0.1), least_until=0.5)
+    floors = [ppo.floor(done) for done in (0.0, 0.25, 0.5, 1.01)]
+    assert floors == pytest.approx([0.4, 0.2, 0.1, 0.1])
+    teaching = Teaching(policy=PolicySpec.of("homing"), pull=0.2, pull_until=0.8)
+    pulls = [teaching.pull_at(done) for done in (0.0, 0.4, 0.8, 1.01)]
+    assert pulls == pytest.approx([0.2, 0.1, 0.0, 0.0])
     rewards = {"delivery": 1.0, "contact": -0.1}
     training = Training(rewards=rewards, final_rewards={"contact": -0.5}, final_rewards_from=0.5)
     weights = [training.rewards_at(done)["contact"] for done in (0.0, 0.25, 0.5, 1.0)]
@@ -50,6 +92,7 @@ def test_worlds_of_several_kinds_stand_side_by_side() -> None:
         ("ppo.n_minibatches = 7", "should divide the batch of 150 robots x 128 steps"),
         ("ppo.restarts = [[0.5, 1e-3], [0.5, 1e-4]]", "should be one after another, all before"),
         ("final_rewards.contact = -1.0", "'contact' should be among the rewards, too"),
+        ("rewards = { 'my.py:pay' = 1.0 }", "mine.toml: .* term 'my.py:pay' is code, which"),
         ("rewards.deliver = 1.0", "no reward term 'deliver'; did you mean 'delivery'"),
         ("scenario.n_itens = 5", "Scenario has no field 'n_itens'"),
         ("teacher.policy = 'swarm-dt'", "'swarm-dt': should be homing or homing-stock, which"),

@@ -43,7 +43,10 @@ def test_text_tables_json_and_the_command_line_say_the_same(tmp_path: Any) -> No
         {"name": "scout", "max_speed": 0.5, "view_range": 2, "lifts": False},
     ]
     size: dict[str, Any] = {"n_robots": 10, "n_items": 20}
-    assert Scenario(**size).replace(robot_kinds=tables) == MIXED
+    for kinds in (tables, tuple(tables), MIXED.robot_kinds):
+        assert Scenario(**size).replace(robot_kinds=kinds) == MIXED
+    one_each = MIXED.replace(robot_kinds=" lifter , scout:3  lifts=false ")
+    assert one_each.model_dump()["robot_kinds"] == "lifter:1, scout:3 lifts=false"
     assert Scenario.from_json(MIXED.to_json()) == Scenario(**MIXED.model_dump()) == MIXED
     assert MIXED.model_dump()["robot_kinds"] == TEXT
     file = tmp_path / "mixed.toml"
@@ -63,12 +66,15 @@ def test_a_scenario_without_kinds_is_written_as_before_there_were_any() -> None:
     assert "robot_kinds" not in Scenario().to_json()
     assert MIXED.replace(robot_kinds=()) == MIXED.replace(robot_kinds="")
     assert "robot_kinds" not in MIXED.replace(robot_kinds=[]).model_dump()
+    largest = MIXED.replace(robot_kinds="a:10000 lifts=true")
+    assert [kind.count for kind in largest.robot_kinds] == [10_000]
 
 
 @pytest.mark.parametrize(
     ("kinds", "complaint"),
     [
         ("scout:0", r"count = 0 of the kind 'scout': should be 1 to 10000 robots"),
+        ("a:10001", r"count = 10001 of the kind 'a': should be 1 to 10000 robots"),
         ("a, a:2", r"name = 'a' is given twice: should be once"),
         ("carrier:1", r"name = 'carrier': .* no role of robots"),
         ("1st:1", r"name = '1st': should be a letter, then letters"),

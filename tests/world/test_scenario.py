@@ -68,6 +68,49 @@ def test_what_cannot_be_is_refused_with_the_reason(fields: dict[str, Any], compl
         Scenario().replace(**fields)
 
 
+ONE: dict[str, Any] = {"n_robots": 1, "n_items": 1}
+
+
+@pytest.mark.parametrize(
+    ("fields", "beyond", "complaint"),
+    [
+        ({"duration": 0.1}, {"duration": 0.099}, "duration = 0.099 s should be at least one cont"),
+        ({"n_requests": 60}, {"n_requests": 61}, "should be at most n_items = 60"),
+        ({"dock_capacity": 10.0}, {"dock_capacity": 10.01}, "dock_capacity = 10.01: should be at"),
+        ({"max_speed": 5.0}, {"max_speed": 5.01}, "lets a robot cross 0.1002 m between"),
+        ({"physics_period": 1e-4}, {"physics_period": 9.9e-5}, "makes 1010.1 physics steps of a"),
+        (
+            {"robot_kinds": "a robot_radius=0.125"}, {"robot_kinds": "a robot_radius=0.126"},
+            "robot_radius = 0.126 m of the kind 'a': should be at most the scenario's",
+        ),
+        (
+            {"delivery_width": 9.75, **ONE}, {"delivery_width": 10.0, **ONE},
+            "delivery_width = 10.0 m leaves no storage: should be less than",
+        ),
+        (
+            {"warehouse_height": 0.25, **ONE}, {"warehouse_height": 0.24, **ONE},
+            "warehouse_height = 0.24 m is narrower than .*: should be at least 0.25 m$",
+        ),
+        (
+            {"warehouse_height": 0.6, "n_obstacles": 1, **ONE},
+            {"warehouse_height": 0.59, "n_obstacles": 1, **ONE},
+            "warehouse_height = 0.59 m is narrower than .*: should be at least 0.6 m$",
+        ),
+        (
+            {"delivery_width": 9.7, "item_radius": 0.15, **ONE},
+            {"delivery_width": 9.72, "item_radius": 0.15, **ONE},
+            "delivery_width = 0.28 m is narrower than .*: should be at least 0.3 m$",
+        ),
+    ],
+)  # fmt: skip
+def test_what_lies_on_a_limit_can_be_and_what_lies_beyond_is_refused(
+    fields: dict[str, Any], beyond: dict[str, Any], complaint: str
+) -> None:
+    Scenario(**fields)
+    with pytest.raises(ScenarioError, match=complaint):
+        Scenario(**beyond)
+
+
 @pytest.mark.parametrize(
     ("field", "count"), [("n_robots", 651), ("n_items", 651), ("n_obstacles", 112)]
 )

@@ -126,6 +126,14 @@ def test_inputs_stay_within_bounds_that_are_finite_in_every_declared_world() -> 
     assert space.high[INPUTS.index("handling_time")] == pytest.approx(2.0, rel=1e-4)
     with pytest.raises(SetupError, match=r"handling_time = 5.0, .* declared by env"):
         MotionFrame(small()).reset(options={"scenario": {"handling_time": 5.0}})
+    rows, _ = MotionFrame(small()).reset(options={"scenario": {"n_items": 5}})
+    assert len(rows) == 6
+
+
+def test_the_slowest_to_gather_speed_bounds_the_time_to_top_speed() -> None:
+    kinds = "porter:3 max_acceleration=0.5, runner:1 max_speed=1.5 max_acceleration=3.0"
+    high = MotionFrame(small(robot_kinds=kinds, max_speed=1.0)).observation_space("robot_0").high
+    assert high[INPUTS.index("time_to_top_speed")] == pytest.approx(1.0 / 0.5, rel=1e-4)
 
 
 def test_it_reads_and_commands_as_the_frame_of_the_shipped_networks_does() -> None:

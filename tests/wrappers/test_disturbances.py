@@ -179,7 +179,8 @@ def test_per_episode_it_is_the_scenario_with_the_drawn_value() -> None:
 
 def test_options_come_first_for_episodes_and_never_get_lost() -> None:
     env = ParameterChange(ParameterChange(small(), "n_items", [5]), "delivery_width", [1.0])
-    env.reset(seed=0, options={"scenario": {"n_items": 7}})
+    env.reset(seed=0, options={"scenario": {"n_items": 7}, "faults": ["FM1:2"]})
+    assert env.warehouse.faults == (Fault("FM1", 2),)
     scenario = env.warehouse.scenario
     assert (scenario.n_items, scenario.delivery_width, scenario.n_robots) == (7, 1.0, 6)
     assert env.env.value == 7

@@ -11,17 +11,21 @@ from typing import Any
 import pytest
 
 from swarm_logistics_env import Scenario
-from swarm_logistics_env.core.errors import FaultError, StudyError, SwarmLogisticsError
+from swarm_logistics_env.core.errors import FaultError, PolicyError, StudyError, SwarmLogisticsError
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.policies.catalogue import WEIGHTS
 from swarm_logistics_env.study.questions.comparison import OTHER_BEHAVIOUR
+from swarm_logistics_env.study.questions.plan import make_plan, refuse_changed_policies
 from swarm_logistics_env.study.questions.presets import PRESETS
+from swarm_logistics_env.study.runs.recorded import RecordedStudy
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks.task import Case, Run
 from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
+from swarm_logistics_env.study.trials import read_trials
 from swarm_logistics_env.study.verdicts.reference import PAPER
 from swarm_logistics_env.world.warehouse import Fault
 from tests.conftest import Check
+from tests.study.tasks.lane import LANE
 
 # The specification of the statistics prints these to three decimals.
 GOLDEN = {
@@ -59,6 +63,10 @@ def test_removed_robots_are_those_that_fail_and_only_what_indicators_need_is_run
     # Nobody looks at a twin without FT.
     assert len(plans["R"].cases) == 2
     assert {comparison.indicator for comparison in plans["R"].comparisons} == {"R"}
+    # So a task that can only start without a robot is asked for R in mid-run.
+    of_lane: dict[str, Any] = {"task": LANE, "policies": ["walker"], "indicators": ["R"]}
+    fault = {"modes": ["silent"], "robots": [1], "onsets": [5.0]}
+    assert len(Study(**of_lane, faults=[fault]).plan().cases) == 2
 
 
 def test_cases_and_runs_are_known_by_content() -> None:
@@ -122,6 +130,7 @@ def test_cases_and_runs_are_known_by_content() -> None:
             {"parameters": [{"name": "delivery_width", "values": [2, 1, 2]}]},
             "values = [2, 1, 2]: should start with x_o above 0 and not repeat it",
         ),
+        ({"parameters": [{"name": "delivery_width", "values": [2, 2]}]}, "and not repeat it: A is"),
         ({"scenario": 3}, "scenario = 3: should be a table of fields or a Scenario"),
         ({"policies": ["swarm-dt", "swarm-dt"]}, "given twice"),
         ({"policies": [{"nam": "swarm-dt"}]}, "PolicySpec has no field 'nam'; did you mean 'name'"),
@@ -269,3 +278,72 @@ def test_plans_are_as_recorded(check_recorded: Check) -> None:
     studies |= {name: Study.preset(name) for name in PRESETS}
     lines = [f"{name}: {line}" for name, study in studies.items() for line in in_words(study)]
     check_recorded("plans.txt", lines)
+
+
+def test_a_plan_tells_how_much_it_plays_and_what_p_is(tmp_path: Path) -> None:
+    sizes: dict[str, Any] = {"sizes": [{"values": [2, 4]}]}
+    clear = Study(name="mine", seeds=3, first_seed=5, until_clear=True, **sizes).plan()
+    assert str(clear) == (
+        "mine: 1 question; 2 conditions x at most 3 seeds from 5 on = at most 6 runs"
+    )
+    plan = Study(seeds=2, sizes=[{"values": [2, 4, 6]}], scenario={"bodies": "dots"}).plan()
+    assert str(plan) == "study: 2 questions; 3 conditions x 2 seeds = 6 runs"
+    assert (plan.unusual_engine, clear.unusual_engine) == ("dots", "")
+    assert [run.seed for run in plan.runs] == [0] * 3 + [1] * 3
+    of_standstills = Study(performance="longest_standstill:9", **sizes).plan()
+    (tmp_path / "t.csv").write_text("robots,boxes\n4,1\n8,2\n")
+    trials = read_trials(tmp_path / "t.csv", columns={"performance": "boxes"})
+    of_file, of_p = (
+        RecordedStudy.of(replace(trials, performance_name=name)).plan for name in ("boxes", "P")
+    )
+    assert [
+        (plan.name_of_p, plan.what_p_is) for plan in (clear, of_standstills, of_file, of_p)
+    ] == [
+        ("P", "the number of items delivered in the order requested"),
+        (
+            "P (longest_standstill:9)",
+            "1 - x / 9 s, at least 0; x is the longest time without a delivery",
+        ),
+        ("P (boxes)", "'boxes' of t.csv"),
+        ("P", "'P' of t.csv"),
+    ]
+
+
+def test_several_trainings_and_unknown_policies_are_refused() -> None:
+    sizes: dict[str, Any] = {"sizes": [{"values": [2, 4]}]}
+    several = Study(policies=["homing", "ppo-robust@all"], until_clear=True, **sizes)
+    with pytest.raises(StudyError) as refused:
+        several.plan()
+    assert str(refused.value) == (
+        "policies = ['ppo-robust@all']: several trainings have a fixed number of seeds; should be "
+        "until_clear = false (--all-seeds)"
+    )
+    ablated = Study(ablations=[{"policy": "homing"}]).specification
+    identities = {"policy swarm-dt": "a"}
+    with pytest.raises(
+        StudyError, match=r"^the study does not know the identity of its ablation 1$"
+    ):
+        make_plan(ablated, code="old", identities=identities)
+    # A part without which the policy is the same is not compared.
+    plan = make_plan(ablated, code="old", identities={**identities, "ablation 1": "b"})
+    assert (plan.code, len(plan.comparisons)) == ("old", 1)
+    with pytest.raises(StudyError, match=r"^the study compares nothing: give sizes, faults, param"):
+        make_plan(ablated, code="old", identities={**identities, "ablation 1": "a"})
+
+
+def test_an_object_that_learned_since_the_plan_is_refused_also_where_no_run_is_missing() -> None:
+    class Mine(SwarmDT):
+        gain = 1.0
+
+    policies = Mine(), "homing"
+    plan = Study(policies=policies, seeds=1, sizes=[{"values": [2, 4]}]).plan()
+    refuse_changed_policies(plan, plan.runs)
+    policies[0].gain = 2.0
+    for runs in ((), plan.runs[-1:]):
+        with pytest.raises(PolicyError, match="policy 'Mine' is not what was planned"):
+            refuse_changed_policies(plan, runs)
+    other_case = replace(plan.cases[-1], identity="another")
+    named = Study(policies=["homing"], seeds=1, sizes=[{"values": [2, 4]}]).plan()
+    refuse_changed_policies(named, named.runs)
+    with pytest.raises(PolicyError, match="policy 'homing' is not what was planned"):
+        refuse_changed_policies(named, [Run(other_case, "code", 0)])

@@ -14,6 +14,7 @@ from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.study.questions.benchmark_cells import DEVELOPMENT, HELD_OUT, REFERENCE
 from swarm_logistics_env.study.report import benchmark
 from swarm_logistics_env.study.report.benchmark import Entry
+from swarm_logistics_env.study.report.section import mean_p
 from swarm_logistics_env.study.report.set_up import setup_sheet
 from swarm_logistics_env.study.studies import Study
 
@@ -106,6 +107,15 @@ def test_the_table_sets_every_cell_beside_the_reference() -> None:
     assert entry.held_out == (tuple(by_hand[1:]),)
     assert entry.score.value == pytest.approx(np.sqrt(by_hand[1] * by_hand[2]))
     shown = benchmark.table(results, entry)
+    assert shown.title == "homing: benchmark of robustness, edition 3"
+    assert shown.columns == (
+        *("cell", "P [95 %]", "P of homing-stock [95 %]", "share"),
+        *("contacts a robot-minute [95 %]", "runs that stand still"),
+    )
+    pairs = [(p["homing", title], p[REFERENCE, title]) for title in titles]
+    assert [row[1:3] for row in shown.rows] == [
+        (mean_p(homing), mean_p(reference)) for homing, reference in pairs
+    ]
     assert [row[0] for row in shown.rows] == [
         "Development 1: ", "Held out 1: ; FM1+FM4, m = 3", "Held out 2: max_speed = 0.2",
     ]  # fmt: skip
@@ -138,6 +148,52 @@ def test_entries_are_written_and_read(tmp_path: Path, monkeypatch: pytest.Monkey
     entries = {"homing": entry_of(np.array([[0.5, 2.0], [0.05, 1.0]]))}
     benchmark.write_entries(entries)
     assert benchmark.read_entries() == entries
+
+
+def test_cells_and_trainings_are_resampled_each_by_themselves() -> None:
+    rng = np.random.default_rng(3)
+    of_cells = rng.normal(1.0, 0.3, (1, 24))
+    of_trainings = np.repeat(rng.normal(2.0, 0.5, (5, 1)), 24, axis=1)
+    means = benchmark._resampled_means([of_cells, of_trainings])
+    assert means.shape == (2000, 2)
+    errors = of_cells.std() / np.sqrt(24), of_trainings.std() / np.sqrt(5)
+    assert means.std(axis=0) == pytest.approx(errors, rel=0.1)
+    expected = of_cells.mean(), of_trainings.mean()
+    assert means.mean(axis=0) == pytest.approx(expected, abs=0.02)
+
+
+def test_the_leaderboard_says_what_is_known_of_each_entry() -> None:
+    entries = {
+        "few": Entry(
+            digest="0123456789", held_out=((0.5, 2.0), (0.5, 1.0)), development=((0.9,), (1.6,)),
+            contacts=12.345, standing_still=0.256,
+        ),
+        "one": Entry(digest="", held_out=((0.2, 0.3),), development=((0.25, 0.25),)),
+    }  # fmt: skip
+    board = benchmark.leaderboard(entries)
+    assert board.title == "Benchmark of robustness, edition 3: entries by score"
+    assert board.columns == (
+        *("policy", "score [95 %]", "rank [95 %]", "same rank", "development"),
+        *("contacts a robot-minute", "runs that stand still", "least share", "digest"),
+    )
+    reference, few, single = [" | ".join(row) for row in board.rows]
+    same = "1.00 [1.00, 1.00]"
+    assert reference == f"{REFERENCE} | {same} | 1 [1, 1] | 100% | {same} | – | – | 1.00 | –"
+    assert few == (
+        "few | 0.84 [0.00, 621.52] | open | – | 1.20 [0.03, 46.42] | 12.3 | 26% | 0.50 | 01234567"
+    )
+    assert single == (
+        "one | 0.24 [0.02, 3.22] | 2 [2, 2] | 100% | 0.25 [0.25, 0.25] | – | – | 0.20 | –"
+    )
+    assert board.lines[0] == (
+        "Score: P as a share of that of homing-stock in the same cell, the geometric mean of the "
+        "held-out cells, which differ from entry to entry; development: of the cells that all "
+        "share."
+    )
+    assert board.lines[1:] == (
+        "Limits of a rank, and how often it is the same: of 2000 resamples.",
+        "Open: of fewer than 5 trainings, too few for a rank.",
+    )
 
 
 @pytest.mark.parametrize("kind", [int, float])  # of ranks, before SciPy 1.18 and since

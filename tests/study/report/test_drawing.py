@@ -13,7 +13,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from swarm_logistics_env.study.report import drawing
-from swarm_logistics_env.study.report.points import Panel, Point
+from swarm_logistics_env.study.report.points import Panel, Point, axis_limits, times_limits
 from tests.conftest import figures_drawn
 
 DRAW = """
@@ -97,13 +97,34 @@ def test_a_legend_of_long_names_is_no_wider_than_its_figure() -> None:
     assert canvas.legends[0].get_window_extent().x1 <= canvas.bbox.x1
 
 
+@pytest.mark.parametrize(
+    ("letters", "n_series", "n_columns"), [(16, 4, 3), (16, 2, 2), (17, 4, 2), (1, 1, 1)]
+)
+def test_a_legend_has_as_many_columns_as_there_is_room_for(
+    letters: int, n_series: int, n_columns: int
+) -> None:
+    names = [str(number) * letters for number in range(n_series)]
+    canvas = Figure(figsize=(drawing.WIDTH, 3.0))
+    axes = canvas.subplots()
+    for name in names:
+        axes.errorbar([1.0], [2.0], [0.5], fmt="s", color=drawing.COLOURS[1], label=name)
+    drawing.add_legend(canvas, axes)
+    legend: Any = canvas.legends[0]
+    assert [text.get_text() for text in legend.get_texts()] == names
+    assert legend._ncols == n_columns
+    for line in legend.get_lines():
+        look = line.get_marker(), line.get_color(), line.get_linestyle()
+        assert look == ("s", drawing.COLOURS[1], "None")
+
+
 def test_columns_of_a_forest_have_scales_of_their_own_and_one_legend() -> None:
     other = POINT._replace(series="central", style=1, value=8.0, high=9.0)
     rows = [("N = 5", [POINT, other])]
     canvas = Figure()
-    drawing.forest(canvas, {"P": rows, "contacts": [("N = 5", [POINT, POINT])]})
+    drawing.forest(canvas, {"P": rows, "contacts": [("N = 5", [POINT, POINT])]}, "Sizes")
     left, right = canvas.axes
     assert (left.get_xlabel(), right.get_xlabel()) == ("P", "contacts")
+    assert (left.get_title(), right.get_title()) == ("Sizes", "")
     assert left.get_xlim()[1] > 9.0 > right.get_xlim()[1]
     (legend,) = canvas.legends
     assert [text.get_text() for text in legend.get_texts()] == ["homing", "central"]
@@ -120,6 +141,12 @@ def drawn_scale(values: list[float], thresholds: tuple[float, ...]) -> str:
     assert low <= min(values) <= max(values) < high
     transform = axes.yaxis.get_transform()
     assert getattr(transform, "linthresh", 1.0) == 1.0  # between -1 and 1 it is linear
+    shown = {f"{tick:g}" for tick in axes.get_yticks() if low <= tick <= high}
+    if axes.get_yscale() == "log":
+        digits = {text.strip("0.") for text in shown}
+        assert digits == {"1", "2", "5"}
+        assert shown <= {label.get_text() for label in axes.get_yticklabels()}
+        assert axes.get_yticks(minor=True).size == 0
     return axes.get_yscale()
 
 
@@ -171,3 +198,141 @@ def test_an_interval_that_leaves_the_axis_ends_in_an_arrow() -> None:
     arrows = {line.get_marker(): np.asarray(line.get_xydata()).tolist() for line in axes.lines}
     low, high = axes.get_xlim()
     assert (arrows["<"], arrows[">"]) == ([[low, 0.0]], [[high, 0.0]])
+
+
+def places_of(axes: Any) -> list[Any]:
+    """Where each line of some axes lies, with its mark."""
+    return [
+        (line.get_marker(), np.round(np.asarray(line.get_xydata()), 3).tolist())
+        for line in axes.lines
+    ]
+
+
+def test_series_stand_beside_each_other_with_what_was_published_and_where_p_is_capped() -> None:
+    second = POINT._replace(series="central", style=1, value=2.0, low=None, high=None)
+    points = (
+        *(POINT._replace(published=5.0, saturated=True, link="question-7"), second),
+        POINT._replace(category="N = 10", decided=False),
+    )
+    canvas = Figure(figsize=(drawing.WIDTH, 3.0))
+    panels = [Panel("One", "R", points, (0.0, 1.0), "N"), Panel("Two", "S", points[:1], (), "M")]
+    drawing.intervals(canvas, panels)
+    all_axes: list[Any] = [*canvas.axes]
+    first, last = all_axes
+    assert (first.get_title(), first.get_ylabel(), first.get_xlabel()) == ("One", "R", "N")
+    assert (last.get_title(), last.get_ylabel(), last.get_xlabel()) == ("Two", "S", "M")
+    assert places_of(first)[:4] == [
+        *(("None", [[0.0, at], [1.0, at]]) for at in (0.0, 1.0)),
+        *(("x", [[-0.02, 5.0]]), ("o", [[-0.12, 4.0]])),
+    ]
+    marks = [(mark, *place) for mark, (place, *_) in places_of(first) if mark in ("o", "s")]
+    assert marks == [("o", -0.12, 4.0), ("s", 0.12, 2.0), ("o", 0.88, 4.0)]
+    fills = [line.get_markerfacecolor() for line in first.lines if line.get_marker() in ("o", "s")]
+    assert fills == [*drawing.COLOURS[:2], drawing.PAPER]
+    gids = {line.get_marker(): line.get_gid() for line in reversed(first.lines)}
+    assert (gids["x"], gids["o"], gids["s"]) == ("published-question-7", "question-7", None)
+    (dagger,) = first.texts
+    assert (dagger.get_text(), dagger.xy) == ("†", (pytest.approx(-0.12), 4.0))
+    assert [tick.get_text() for tick in first.get_xticklabels()] == ["N = 5", "N = 10"]
+    assert first.get_xlim() == (-0.6, 1.6)
+    assert first.get_ylim() == pytest.approx(axis_limits(points))
+    assert last.get_ylim() == (0.0, pytest.approx(axis_limits(points[:1])[1]))
+    assert last.get_xlim() == (-0.6, 0.6)
+    assert [len(axes.lines[0].get_xydata()) for axes in (first, last)] == [2, 1]
+
+
+@pytest.mark.parametrize(
+    ("series", "title", "shown"), [("homing", "", "homing"), ("homing", "R", "R")]
+)
+def test_a_single_series_stands_in_the_title(series: str, title: str, shown: str) -> None:
+    canvas = Figure()
+    drawing.intervals(canvas, [Panel(title, "", (POINT._replace(series=series),), (), "")])
+    assert canvas.axes[0].get_title() == shown
+    assert canvas.legends == []
+
+
+@pytest.mark.parametrize(("letters", "rotation"), [(40, 0.0), (41, 40.0)])
+def test_long_categories_are_turned(letters: int, rotation: float) -> None:
+    points = tuple(POINT._replace(category=c * letters) for c in "ab")
+    canvas = Figure(figsize=(4.2 / 0.775, 3.0))
+    drawing.intervals(canvas, [Panel("", "", points, (), "")])
+    assert {tick.get_rotation() for tick in canvas.axes[0].get_xticklabels()} == {rotation}
+
+
+def test_rows_of_a_forest_have_headings_thresholds_and_far_values() -> None:
+    far = POINT._replace(value=20.0, low=10.0, high=30.0, published=1.0)
+    rows = [("Sizes", []), ("N = 5", [POINT._replace(published=0.0), far]), ("N = 6", [far] * 8)]
+    canvas = Figure()
+    drawing.forest(canvas, {"S": rows})
+    axes: Any = canvas.axes[0]
+    labels = axes.get_yticklabels()
+    assert [label.get_text() for label in labels] == ["Sizes", "N = 5", "N = 6"]
+    assert [label.get_fontweight() for label in labels] == ["bold", "normal", "normal"]
+    ticks = axes.yaxis.get_major_ticks()
+    assert [tick.tick1line.get_visible() for tick in ticks] == [False, True, True]
+    assert axes.get_ylim() == (2.6, -0.6)
+    heights = [y for mark, ((_, y), *_) in places_of(axes) if mark == "o"]
+    assert heights == [0.85, 1.15, *np.round(1.7375 + 0.075 * np.arange(8), 3)]
+    sizes = [line.get_markersize() for line in axes.lines if line.get_marker() == "o"]
+    assert sizes[2:] == [sizes[0] / 2.0] * 8
+    thresholds = [c for c in axes.collections if len(c.get_paths()[0].vertices) == 2]
+    segments = [bar.get_segments()[0].tolist() for bar in thresholds]
+    assert [s for s in segments if s[0][0] == s[1][0]] == [
+        [[1.0, row - 0.4], [1.0, row + 0.4]] for row in (1, *[2] * 8)
+    ]
+    assert ("None", [[0.0, 0.0], [0.0, 1.0]]) in places_of(axes)
+    low, high = axis_limits([POINT._replace(published=0.0), far])
+    assert axes.get_xlim() == pytest.approx((1.5 * low, 1.5 * high))
+    transform = axes.xaxis.get_transform()
+    assert (axes.get_xscale(), transform.linthresh) == ("symlog", 1.0)
+    canvas.draw_without_rendering()
+    assert {"0", "1", "10"} <= {label.get_text() for label in axes.get_xticklabels()}
+
+
+def test_factors_lie_on_a_logarithmic_axis_about_1() -> None:
+    point = POINT._replace(value=0.5, low=0.25, high=30.0, published=1.0)
+    canvas = Figure()
+    drawing.forest(canvas, {"times": [("N = 5", [point])]}, is_of_times=True)
+    axes: Any = canvas.axes[0]
+    assert (axes.get_xscale(), axes.get_xlim()) == ("log", pytest.approx(times_limits([point])))
+    in_view = [tick for tick in axes.get_xticks() if 0.25 / 1.15 <= tick <= 5.0 * 1.15]
+    assert in_view == pytest.approx([0.5, 1.0, 2.0, 5.0])
+    canvas.draw_without_rendering()
+    assert {"0.5", "1", "2", "5"} <= {label.get_text() for label in axes.get_xticklabels()}
+    assert axes.get_xticks(minor=True).size == 0
+    assert ("None", [[1.0, 0.0], [1.0, 1.0]]) in places_of(axes)
+    assert (">", [[5.75, 0.0]]) in places_of(axes)
+    assert len(axes.collections) == 1
+
+
+@pytest.mark.parametrize(
+    ("note", "style", "size", "lines"),
+    [
+        ("", drawing.PAGE_STYLE, ("374.4pt", "144pt"), []),
+        (
+            f"Bars: 95 % {17 * 'word '}end.",
+            drawing.PAGE_STYLE,
+            ("374.4pt", "165.6pt"),
+            ["Bars: 95\N{NO-BREAK SPACE}% " + " ".join(14 * ["word"]), "word word word end."],
+        ),
+        (  # a quarter as wide has letters of half the size
+            f"Bars: 95 % {17 * 'word '}end.",
+            drawing.FigureStyle(1.3, drawing.SERIF),
+            ("93.6pt", "88.2pt"),
+            [
+                "Bars: 95\N{NO-BREAK SPACE}% word word word word word word",
+                *("word word word word word word word word", "word word word end."),
+            ],
+        ),
+    ],
+)
+def test_a_note_is_folded_below_its_drawing(
+    note: str, style: drawing.FigureStyle, size: tuple[str, str], lines: list[str]
+) -> None:
+    with figures_drawn("svg"):
+        svg = drawing.svg_image(lambda canvas: canvas.subplots().set_axis_off(), 2.0, note, style)
+    root = ElementTree.fromstring(svg)
+    assert (root.get("width"), root.get("height")) == size
+    texts = [str(text.text) for text in root.iterfind(".//{*}text")]
+    assert [text for text in texts if text[0] in "Bw"] == lines
+    assert "<dc:date>" not in svg

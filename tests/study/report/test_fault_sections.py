@@ -144,12 +144,45 @@ def test_deliveries_over_time_are_rates_of_the_window(repaired: StudyResults) ->
         assert axes.get_ylim()[1] >= max(curve.high.max() for curve in many)
 
 
+def test_the_figure_of_deliveries_has_a_panel_for_each_number_of_robots(
+    repaired: StudyResults,
+) -> None:
+    (figure,) = (f for f in document(repaired).figures if f.name.startswith("deliveries"))
+    assert figure.name == "deliveries-swarm-dt-Fault-tolerance-and-robustness-dead-600s"
+    assert figure.caption == (
+        "swarm-dt, Fault tolerance and robustness, N = 25: deliveries in the trailing 100 s around "
+        "failure mode dead from 600 s."
+    )
+    assert figure.note == (
+        "Mean over 8 paired seeds (0 to 7); bands: pointwise 95 % t-intervals; dotted: the fault "
+        "begins."
+    )
+    columns = ["panel", "runs", "seconds", "deliveries", "low", "high", "confidence"]
+    assert [*figure.data.columns] == columns
+    rates = only(repaired).curves
+    assert [*figure.data.iloc[0]] == [
+        "m = 3",
+        "no fault",
+        *(part[0] for part in rates[0][1:]),
+        0.95,
+    ]
+    assert len(figure.data) == sum(len(rate.seconds) for rate in rates)
+    assert figure.height == pytest.approx(2.9)
+    canvas = Figure()
+    figure.draw(canvas)
+    (axes,) = canvas.axes
+    assert (axes.get_title(), axes.get_xlabel()) == ("swarm-dt, m = 3", "end of the window [s]")
+    assert axes.get_ylabel() == "deliveries in 100 s"
+    assert np.unique(axes.lines[-1].get_xdata()).tolist() == [ONSET]
+
+
 def test_figures_have_files_and_numbers_of_their_own() -> None:
-    sizes = [{"title": title, "values": [5, 10]} for title in ("My sizes", "my-sizes")]
+    sizes = [{"title": title, "values": [5, 10]} for title in ("My sizes", "my-sizes", "MY_sizes")]
     study = Study(seeds=4, sizes=sizes, ablations=[{"policy": "random-walk", "fall": 0.25}])
     results = judged(
         study, lambda _, at, s: delivered((20 if at.name == "random-walk" else 40) + s)
     )
     *first_figures, last = document(results).figures
-    assert [figure.name for figure in first_figures] == ["answer", "S-My-sizes", "S-my-sizes-2"]
+    names = ["answer", "S-My-sizes", "S-my-sizes-2", "S-MY-sizes-3"]
+    assert [figure.name for figure in first_figures] == names
     assert last.data["value"].tolist() == pytest.approx([21.5 / 41.5 - 1])

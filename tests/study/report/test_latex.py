@@ -14,7 +14,7 @@ import pytest
 from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.document import document
-from swarm_logistics_env.study.report.for_a_paper import PaperTables, in_a_sentence
+from swarm_logistics_env.study.report.for_a_paper import HOLM, PaperTables, in_a_sentence
 from swarm_logistics_env.study.report.latex import latex_tables
 from swarm_logistics_env.study.report.section import Section
 from swarm_logistics_env.study.studies import Study
@@ -169,3 +169,81 @@ def compiled(latex: str, page: str, tmp_path: Path) -> str:
     assert done.returncode == 0, printed[-2000:]
     assert (tmp_path / "paper.pdf").is_file()
     return printed
+
+
+NARROW = Section(
+    "A: P",
+    ("N", "P [95 %]", "level"),
+    (
+        ("N = 5", "-1.25 [-10.5, ∞]†", "0.5 [0.25, 0.75] a"),
+        ("[x]", "12 [3, 4.125]", "–"),
+        ("* speed_1 1→2", "no run", "1 of 12 'so'"),
+    ),
+    ("Below α.", ""),
+)
+TABLE = r"""\begin{table}
+\centering
+\caption{A: P. By $P_{\mathrm{F}}$. Intervals in brackets, at the level in the heading or in the row. Below \texttt{U+03B1}. \dag{}: P is capped, every item was delivered in a run.}
+\label{tab:a-p}
+\smallskip
+\footnotesize
+\setlength{\tabcolsep}{3pt}
+\begin{tabular}{@{}lll@{}}
+\toprule
+N & P [95\,\%] & level \\
+\midrule
+${N = 5}$ & $\phantom{0}{-}1.25$ [$-10.5$, $\infty $]$\phantom{.000}$\dag{} & $\phantom{0}0.5$ [$0.25$, $0.75$] a \\
+{}[x] & $\phantom{-}12\phantom{.00}$ $\phantom{0}\phantom{-}$[$3$,$\phantom{.0}$ $\phantom{0}4.125$] & -- \\
+{}* speed 1 to 2 m/s & no run & 1 of $12\phantom{.0}$ `so' \\
+\bottomrule
+\end{tabular}
+\end{table}"""  # noqa: E501
+
+
+def test_a_table_is_written_letter_by_letter() -> None:
+    text = latex_tables(PaperTables("By P_F.", (NARROW,), {"speed_1": "speed [m/s]"}))
+    assert text.splitlines()[2:] == TABLE.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("widths", "environment", "size", "layout"),
+    [
+        ((25, 15, 15), "table", "footnotesize}3", "lll"),
+        ((26, 15, 15), "table*", "footnotesize}3", "lll"),
+        ((42, 15, 15), "table*", "footnotesize}3", "lll"),
+        ((43, 15, 15), "table*", "scriptsize}1.5", "lll"),
+        ((25, 31), "table", "footnotesize}3", r"lp{0.16\linewidth}"),
+        ((26, 30), "table", "footnotesize}3", "ll"),
+    ],
+)
+def test_a_table_is_as_wide_and_small_as_its_letters_need(
+    widths: tuple[int, ...], environment: str, size: str, layout: str
+) -> None:
+    table = Section("t", tuple("h" for _ in widths), (tuple("x" * width for width in widths),))
+    lines = latex_tables(PaperTables("", (table,), {})).splitlines()[2:]
+    name, separation = size.split("}")
+    assert lines[0] == rf"\begin{{{environment}}}"
+    assert lines[-1] == rf"\end{{{environment}}}"
+    assert lines[5:8] == [
+        rf"\{name}",
+        rf"\setlength{{\tabcolsep}}{{{separation}pt}}",
+        rf"\begin{{tabular}}{{@{{}}{layout}@{{}}}}",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("columns", "words"),
+    [
+        (("q", "v"), ""),
+        (("q", "P [95 %]"), "95\\,\\% intervals in brackets. "),
+        (("P [95 %]", "R [95 %]"), "95\\,\\% intervals in brackets. "),
+        (
+            ("P [95 %]", "R [97.5 %]"),
+            "Intervals in brackets, at the level in the heading or in the row. ",
+        ),
+    ],
+)
+def test_a_caption_says_the_level_of_intervals(columns: tuple[str, ...], words: str) -> None:
+    table = Section("t", columns, (("x", "y"),))
+    (caption,) = re.findall(r"\\caption{(.*)}", latex_tables(PaperTables("", (table,), {})))
+    assert caption == f"t. {words}{HOLM}"

@@ -21,8 +21,9 @@ import pytest
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.policies.episode import Play
 from swarm_logistics_env.study.report.document import document
+from swarm_logistics_env.study.report.page import _titles, marked_up
 from swarm_logistics_env.study.report.page import html as html_page
-from swarm_logistics_env.study.report.page import marked_up
+from swarm_logistics_env.study.report.points import Panel, Point
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.study.verdicts.results import StudyResults
@@ -107,6 +108,24 @@ class Scale:
 
     def values(self, positions: Iterable[float]) -> list[float]:
         return [(position - self.start) / self.factor for position in positions]
+
+
+def test_a_mark_says_its_value_and_what_was_published() -> None:
+    point = Point("homing", 0, "FM1 2", 0.12345, 0.0004, 0.3, 0.25, link="question-7")
+    small = point._replace(value=0.0123, low=None, published=None, link="condition-1")
+    large = point._replace(value=41.26, low=38.0, high=44.5, link="condition-2")
+    nothing = point._replace(value=None, published=12.0, link="question-8")
+    panels = [
+        Panel("", "", (point, nothing), (0.0,), ""),
+        Panel("", "", (small, large._replace(published=None)), (), ""),
+    ]
+    assert _titles(panels) == {
+        "question-7": "homing, FM1 2: 0.123 [0.0004, 0.300]",
+        "published-question-7": "published: 0.25",
+        "published-question-8": "published: 12",
+        "condition-1": "homing, FM1 2: 0.0123",
+        "condition-2": "homing, FM1 2: 41.3 [38.0, 44.5]",
+    }
 
 
 def test_of_many_deliveries_a_page_draws_some_seeds_alone() -> None:

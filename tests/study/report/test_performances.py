@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import re
 
+import pandas as pd
+
+from swarm_logistics_env import judge as judge_trials
 from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.terminal_answer import terminal_answer
@@ -52,3 +55,24 @@ def test_a_study_that_compares_policies_alone_says_p_of_each_in_its_first_table(
     text = terminal_answer(answer(study.findings()), 80)
     for policy in ("swarm-dt", "homing"):
         assert re.search(rf"^{policy}: P \[95 %\] = .* N = 4,\s+as it is", text, re.MULTILINE)
+
+
+def test_an_overview_names_conditions_where_they_differ() -> None:
+    rows = [
+        (policy, n, n * 3 + trial)
+        for policy, sizes in {"a": (4, 8), "b": (6, 8), "c": (4, 8)}.items()
+        for n in sizes
+        for trial in range(3)
+    ]
+
+    def overview_of(rows: list[tuple[str, int, int]]) -> tuple[object, ...]:
+        frame = pd.DataFrame(rows, columns=["policy", "robots", "P"])
+        overview = answer(judge_trials(frame)).overview
+        assert overview is not None
+        return overview.columns, *overview.rows
+
+    four, six = "13.0 [10.5, 15.5]", "19.0 [16.5, 21.5]"
+    first, second, third = ("a, N = 4", four), ("b, N = 6", six), ("c, N = 4", four)
+    assert overview_of(rows) == (("[95 %]", "P"), first, second, third)
+    alike = [(policy, 4 if n == 6 else n, p - 6 * (n == 6)) for policy, n, p in rows]
+    assert overview_of(alike) == (("[95 %]", "P, N = 4"), ("a", four), ("b", four), ("c", four))

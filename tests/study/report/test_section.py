@@ -8,6 +8,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -18,12 +19,19 @@ from swarm_logistics_env.study.report.for_a_paper import in_a_sentence
 from swarm_logistics_env.study.report.latex import latex_tables
 from swarm_logistics_env.study.report.section import (
     bracketed,
+    count_words,
+    digits_of,
     fixed,
     interval_to_clear,
     join_names,
     levels,
+    number,
     percent,
+    plural,
+    share_in_words,
+    slug,
     time_to_clear,
+    width_of,
 )
 from swarm_logistics_env.study.report.terminal_answer import terminal_answer
 from swarm_logistics_env.study.report.write import markdown, write_report
@@ -189,3 +197,32 @@ def test_names_are_joined_as_a_sentence_has_them() -> None:
         "a and b",
         "a, b and c",
     ]
+
+
+@pytest.mark.parametrize(
+    ("shown", "expected"),
+    [
+        ([digits_of(p) for p in (-1.0, 0.0, 0.0123, 0.1, 0.999, 1.0)], [1, 1, 4, 3, 3, 1]),
+        ([digits_of(0.5, width) for width in (0.0, 0.2, 0.00031, np.inf)], [3, 3, 4, 3]),
+        ([digits_of(40.0, width) for width in (0.0, 5.0, 0.5, 0.012)], [1, 1, 1, 2]),
+        ([width_of(spi.Interval(2.0, *ends)) for ends in ((1.0, 4.0), (None, 4.0))], [3.0, 0.0]),
+        ([fixed(value, 2) for value in (-0.001, 1.005, -np.inf)], ["0.00", "1.00", "-∞"]),
+        ([bracketed(spi.Interval(2.0, 1.0, None), 1), bracketed(None, 1)], ["2.0", "–"]),
+        ([bracketed(spi.Interval(2.0, 1.0, np.inf), 0)], ["2 [1, ∞]"]),
+        ([number(None), number(1.23456), number(1.25, 1)], ["–", "1.235", "1.2"]),
+        ([percent(level) for level in (0.95, 0.98765, 0.9999)], ["95 %", "98.77 %", "99.99 %"]),
+        ([percent(0.99991)], ["> 99.99 %"]),
+        ([share_in_words(spi.Interval(0.158, 0.096, 0.234))], ["16 % [10, 23]"]),
+        ([share_in_words(spi.Interval(0.158, None, 1.0))], ["16 % [0, 100]"]),
+        ([plural(n, "claim") for n in (0, 1, 2)], ["0 claims", "1 claim", "2 claims"]),
+        ([slug("R, S", "a/b_c", 1.5, "ü"), len(slug("a" * 99))], ["R-S-a-b-c-1-5", 80]),
+        (
+            [count_words(["open", "refuted", "supported (n < 10)", "undefined", "open"])],
+            ["1 supported (n < 10), 1 refuted, 2 open, 1 undefined"],
+        ),
+    ],
+)
+def test_numbers_and_words_are_shown_alike_everywhere(
+    shown: list[str | float], expected: list[str | float]
+) -> None:
+    assert shown == expected

@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure as Canvas
 
+from swarm_logistics_env import spi
 from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.report.drawing import svg_image
 from swarm_logistics_env.study.report.figures import trade_off_figure
@@ -48,7 +50,11 @@ def test_each_condition_has_a_row_with_a_point_a_policy() -> None:
     assert figure.data["cell"].tolist() == ["N = 5", "N = 10", "N = 20"] * 2
     first = figure.data.iloc[0]
     assert (first["policy"], first["contacts"], first["mean"]) == ("swarm-dt", 9.0, 11.0)
-    assert first["contacts_low"] < 9.0 < first["contacts_high"]
+    mean, contacts = (spi.mean_interval(runs) for runs in ([10, 11, 12], [8.0, 9.0, 10.0]))
+    assert [*first] == ["swarm-dt", "N = 5", *contacts, *mean, 0.95]
+    columns = ["policy", "cell", "contacts", "contacts_low", "contacts_high", "mean", "low", "high"]
+    assert [*figure.data.columns] == [*columns, "confidence"]
+    assert figure.height == pytest.approx(0.8 + 3 * 0.3)
     with figures_drawn("svg"):
         svg = svg_image(figure.draw, figure.height, figure.note)
     assert [svg.count(f">N = {n}<") for n in (5, 10, 20)] == [1, 1, 1]
@@ -80,6 +86,10 @@ def test_conditions_without_a_contact_have_a_row() -> None:
     peaceful = judged(study, lambda *_: replace(delivered(7), contacts_per_robot_minute=0.0))
     (figure,) = trade_off_figure(peaceful)
     assert figure.data["contacts"].tolist() == [0.0, 0.0]
+    for shown, title in ((figure, "homing"), (next(trade_off_figure(results([5, 10]))), "")):
+        canvas = Canvas()
+        shown.draw(canvas)
+        assert [axes.get_title() for axes in canvas.axes] == [title, ""]
 
 
 def test_without_any_count_there_is_neither_picture_nor_column() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import csv
 import re
 import sys
@@ -11,10 +12,18 @@ from xml.etree import ElementTree
 
 import pytest
 
+from swarm_logistics_env.core.errors import StudyError
+from swarm_logistics_env.study.report import write
 from swarm_logistics_env.study.report.document import document
+from swarm_logistics_env.study.report.drawing import PAGE_STYLE, SERIF, FigureStyle, Images
 from swarm_logistics_env.study.report.section import Section, limits, word_to_count
 from swarm_logistics_env.study.report.sentences import sentence
-from swarm_logistics_env.study.report.write import markdown, section_markdown, write_report
+from swarm_logistics_env.study.report.write import (
+    markdown,
+    section_markdown,
+    write_document,
+    write_report,
+)
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from tests.conftest import figures_drawn
@@ -119,6 +128,38 @@ def test_every_verdict_quotes_seeds_interval_and_what_it_rests_on(few: StudyResu
     assert re.search(
         r"too few to exclude stalled ones .* p is \S+: it needs at least \d+ seeds\.", text
     )
+
+
+def test_figures_for_a_journal_leave_the_page_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def drawn(_draw: object, height: float, note: str, style: FigureStyle = PAGE_STYLE) -> str:
+        words = f"{style.width} {height:.1f} {len(note)}"
+        return f'<svg xmlns="http://www.w3.org/2000/svg" id="{words}"/>'
+
+    monkeypatch.setattr(write, "svg_image", drawn)
+    monkeypatch.setattr(write, "images", lambda *parts: Images(drawn(*parts), b"%PDF", b"PNG"))
+    study = Study(seeds=3, sizes=[{"values": [5, 10]}])
+    report = document(judged(study, lambda _, at, seed: delivered(5.0 * at.value + seed)))
+    (figure, *_) = report.figures
+    shape = f"{figure.height:.1f} {len(figure.note)}"
+    for style in (PAGE_STYLE, FigureStyle(3.4, SERIF)):
+        paths = write_document(report, tmp_path, style)
+        names = ["report.html", "report.md", "cells.csv", "claims.csv", "tables.tex"]
+        assert [path.name for path in paths] == names
+        file = tmp_path / "figures" / figure.name
+        assert f'id="{style.width} {shape}"' in file.with_suffix(".svg").read_text()
+        assert file.with_suffix(".pdf").read_bytes() == b"%PDF"
+        assert file.with_suffix(".png").read_bytes() == b"PNG"
+        of_page = drawn(None, figure.height, figure.note).encode()
+        assert base64.b64encode(of_page).decode() in paths[0].read_text()
+
+
+def test_a_folder_that_cannot_be_made_is_named(few: StudyResults, tmp_path: Path) -> None:
+    (tmp_path / "figures").write_text("")
+    with pytest.raises(StudyError) as refusal:
+        write_report(few, tmp_path)
+    assert str(refusal.value) == f"cannot write {tmp_path / 'figures'}: File exists"
 
 
 @pytest.mark.parametrize("package", ["matplotlib", "jinja2"])

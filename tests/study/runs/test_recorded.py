@@ -81,6 +81,34 @@ def test_trials_are_judged_as_their_store_is(tmp_path: Path, text: str) -> None:
     assert judged.cell_table.equals(stored.cell_table)
     assert repr(judged.outcomes) == repr(stored.outcomes)
     assert repr(judged) == repr(stored)
+    ends = {outcome.ended_at for outcome in judged.outcomes.values()}
+    assert ends == {0.0 if text == LAB else 300.0}
+
+
+def test_a_study_of_trials_notes_where_they_come_from(tmp_path: Path) -> None:
+    (tmp_path / "table.csv").write_text(
+        "robots,map,delivered,policy\n8,b,20,Y\n4,b,9,x\n4,a,10,x\n4,a,12,x\n8,a,18,x\n4,a,3,Y\n"
+    )
+    trials = read_trials(tmp_path / "table.csv")
+    plan = RecordedStudy.of(trials, {"arena": "4 m"}).plan
+    origin = plan.origin
+    assert origin is not None
+    assert (origin.file, origin.digest, origin.paired, origin.seeds, origin.setup) == (
+        "table.csv", trials.digest, True, (0, 1), (("arena", "4 m"),)
+    )  # fmt: skip
+    assert (origin.performance, origin.references, origin.blocks) == ("delivered", (), ("a", "b"))
+    assert [(row.policy, row.n_robots, row.line, row.n_trials) for row in origin.trials] == [
+        ("x", 4, 3, 2), ("x", 8, 6, 1), ("Y", 4, 7, 1), ("Y", 8, 2, 1),
+    ]  # fmt: skip
+    specification = plan.specification
+    assert (specification.name, specification.seeds) == ("table", 2)
+    assert [policy.title for policy in specification.policies] == ["x", "Y"]
+    assert [comparison.indicator for comparison in plan.comparisons] == [
+        "S",
+        "S",
+        "change",
+        "change",
+    ]
 
 
 @pytest.mark.parametrize("asks_ft", [True, False])
@@ -245,26 +273,57 @@ def test_the_reference_of_a_is_no_matter_of_the_first_row(tmp_path: Path) -> Non
 HEAD = "robots,fault,faulty,width,delivered\n"
 
 
+ALONE = (
+    "2: stands alone: should differ from some other row in the fault, the number of robots or one "
+    "parameter alone"
+)
+UNSETTLED = (
+    "{}: A is relative to one value of {!r}, and no condition without a fault has more trials than "
+    "all others: say --reference {} or --reference {}, or leave it out by --ignore {}"
+)
+TWO_TAGS = UNSETTLED.format(2, "boxes", "boxes=10", "boxes=20", "boxes")
+OF_TWO = f"{ALONE}; columns taken for parameters: 'weight', 'slope'"
+NO_P_O = (
+    "3: has the fault 'FM1', but no row without one (fault none) of the same robots and "
+    "parameters: R and FT are relative to it; robots counts failed and removed ones, too"
+)
+TOGETHER = (
+    "2: the number of robots and 'tags' change together, so what comes of either cannot be told: "
+    "should have trials in which one of them alone differs; --ignore tags counts what comes of "
+    "both as the robots'"
+)
+OF_WORK = "; if it counts what a run had to do, P is that by its time: --column work=boxes"
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (HEAD + "5,,,,9\n", "line 2: stands alone"),
-        (HEAD + "25,none,0,,9\n20,FM1,1,,9\n", "line 3: has the fault 'FM1', but no row"),
-        (HEAD + "5,,,0,9\n5,,,0,8\n5,,,2,9\n", "width = 0 is the reference, and A is relative"),
-        (HEAD + "5,,,1,9\n5,,,2,9\n", "say --reference width=1 or --reference width=2, or leave"),
+        (HEAD + "5,,,,9\n", ALONE),
+        (HEAD + "25,none,0,,9\n20,FM1,1,,9\n", NO_P_O),
         (
-            "robots,boxes,time to finish [s]\n5,10,90\n5,20,150\n",
-            "if it counts what a run had to do, P is that by its time: --column work=boxes",
+            HEAD + "5,,,0,9\n5,,,0,8\n5,,,2,9\n",
+            "2: width = 0 is the reference, and A is relative to it: say --reference width=2",
         ),
         (
-            "robots,tags,delivered\n4,8,9\n4,8,8\n8,16,20\n",
-            "line 2: the number of robots and 'tags' change together",
+            HEAD + "5,,,2,9\n5,,,1,9\n",
+            UNSETTLED.format(2, "width", "width=1", "width=2", "width"),
         ),
         (
-            "robots,tags,delivered\n4,8,9\n4,8,8\n8,16,20\n",
-            "should have trials in which one of them alone differs; --ignore tags counts what",
+            "robots,my width,delivered\n5,0.5,0.5\n5,0,0.2\n5,2,0.3\n",
+            UNSETTLED.format(2, "my width", "'my width=0.5'", "'my width=2'", "'my width'"),
         ),
-        ("robots,weight,slope,delivered\n4,1,0,9\n4,2,3,9\n", "parameters: 'weight', 'slope'"),
+        ("robots,boxes,time to finish [s]\n5,10,90\n5,20,150\n", TWO_TAGS + OF_WORK),
+        (
+            "robots,boxes,time to finish [s]\n5,10,90\n5,20.5,150\n",
+            UNSETTLED.format(2, "boxes", "boxes=10", "boxes=20.5", "boxes"),
+        ),
+        ("robots,boxes,delivered\n5,20,0.5\n5,10,2\n5,20,0.7\n5,10,3\n", TWO_TAGS),
+        ("robots,tags,delivered\n4,8,9\n4,8,8\n8,16,20\n", TOGETHER),
+        ("robots,weight,slope,delivered\n4,1,0,9\n4,2,3,9\n", OF_TWO),
+        (
+            "robots,weight,slope,delivered\n4,1,0,9\n4,1,0,8\n4,2,3,9\n",
+            f"{OF_TWO}; references: weight = 1, slope = 0",
+        ),
     ],
 )
 def test_bad_file_is_refused_in_one_sentence_and_leaves_nothing(
@@ -272,9 +331,7 @@ def test_bad_file_is_refused_in_one_sentence_and_leaves_nothing(
 ) -> None:
     with pytest.raises(StudyError) as caught:
         imported(tmp_path, text)
-    assert words in str(caught.value)
-    assert str(caught.value).startswith("table.csv, ")
-    assert "\n" not in str(caught.value)
+    assert str(caught.value) == f"table.csv, line {words}"
     assert not (tmp_path / "out").exists()
 
 

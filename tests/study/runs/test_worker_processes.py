@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import pickle
 import signal
 import threading
@@ -9,7 +10,8 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from typing import Any
+from pathlib import Path
+from typing import Any, TextIO
 
 import pytest
 
@@ -97,3 +99,21 @@ def test_only_the_main_thread_has_workers_ignore_ctrl_c() -> None:
     thread.join()
     assert handlers == [signal.SIG_IGN, usual]
     assert signal.getsignal(signal.SIGINT) == usual
+
+
+def test_a_worker_ends_in_a_run_that_takes_too_long_and_leaves_no_report_of_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[object] = []
+
+    def begin(limit: float, *, exit: bool, file: TextIO) -> None:
+        calls.append((limit, exit, file.name))
+
+    monkeypatch.setattr(faulthandler, "dump_traceback_later", begin)
+    monkeypatch.setattr(faulthandler, "cancel_dump_traceback_later", lambda: calls.append("ends"))
+    watch, run = worker_processes._Watch(3.0, tmp_path), Run(CASE, "code", 0)
+    with watch.over(run):
+        assert (tmp_path / run.key).exists()
+    assert calls == [(3.0, True, str(tmp_path / run.key)), "ends"]
+    assert not any(tmp_path.iterdir())
+    assert watch.error(run) is None

@@ -107,6 +107,23 @@ def test_a_run_has_the_nearest_number_of_steps_and_one_at_least(
     assert (run.error, run.ended_at) == (None, 0.5 * steps)
 
 
+class Leaving(Lane):
+    """Of its robots one leaves in every step."""
+
+    def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:
+        assert list(actions) == self.agents
+        results = super().step({**dict.fromkeys(self.cells, 0), **actions})
+        self.agents = self.agents[1:]
+        return results
+
+
+def test_a_run_ends_with_its_last_agent() -> None:
+    task = task_of(Leaving, performance=lambda env, *_: len(env.agents), period=0.5)
+    run = only_run(task).play()
+    assert (run.error, run.ended_at) == (None, 1.5)
+    assert run.delivery_times.tolist() == [0.5, 0.5, 1.0]
+
+
 class Told(Walker):
     """Remembers what it was told before its first step."""
 
@@ -241,7 +258,10 @@ def test_by_references_what_is_below_zero_is_a_score() -> None:
     ("fields", "words"),
     [
         ({"failures": {"silnt": 0}}, "no mode 'silnt'; did you mean 'silent'?"),
+        ({"failures": {"silent": None}}, "failures['silent'] = None: should be the action that c"),
         ({"failures": {"noisy": 0.0}}, "should be a standard deviation above 0"),
+        ({"failures": {"noisy": "1"}}, "failures['noisy'] = '1': should be a standard deviation"),
+        ({"failures": {"removed": 0}}, "failures['removed'] = 0: should be the name of the fact"),
         ({"references": (1.0, 1.0)}, "should be two different scores"),
     ],
 )
@@ -277,6 +297,8 @@ def test_what_cannot_be_is_refused_before_any_run(fields: dict[str, Any], words:
 def test_a_task_has_the_faults_of_its_failure_modes_alone() -> None:
     with pytest.raises(FaultError, match="task lane: no failure mode 'silnt'; did you mean 'sil"):
         LANE.fault("silnt", 1, 0.0, None, {})
+    with pytest.raises(FaultError, match="RobotFault has no field 'role'"):
+        LANE.fault("silent", 1, 0.0, None, {"role": "carrier"})
 
 
 def test_what_is_no_number_is_no_field_to_vary() -> None:

@@ -47,6 +47,7 @@ def played(mode: str, seed: int = 3, **fields: Any) -> tuple[list[list[int]], li
 
 def test_faults_of_one_seed_are_nested_and_differ_between_seeds() -> None:
     sets = [set(failing_rows(5, 10, m)) for m in range(11)]
+    assert list(failing_rows(5, 10, 7)) == sorted(sets[7])
     assert all(a < b for a, b in pairwise(sets))
     assert len({failing_rows(seed, 10, 1) for seed in range(30)}) > 5
 
@@ -77,10 +78,44 @@ def test_blind_and_noisy_robots() -> None:
         assert (noisy[t][other] == seen[t][other]).all()
         assert (noisy[t][me] == again[t][me]).all()
     assert noisy[0][me].dtype == np.float32
-    assert 0.2 < np.std([noisy[t][me][1] for t in range(11)]) < 1.0
+    lengths = [noisy[t][me][1] for t in range(11)]
+    assert np.mean(lengths) == pytest.approx(6.0, abs=0.6)
+    assert 0.2 < np.std(lengths) < 1.0
     env = FailingRobots(Lane(3), [RobotFault(mode="noisy", robots=3)], FAILURES)
     errors = {value[1] - 6 for value in env.reset(seed=3)[0].values()}
     assert len(errors) == 3, "each robot errs on its own"
+
+
+def test_without_a_seed_an_episode_has_the_next_one_the_first_seed_0() -> None:
+    lane = Lane(9)
+    lane.reset(seed=0)
+    env = FailingRobots(lane, [RobotFault(mode="blind", robots=1)], FAILURES)
+    for seed, expected in ((None, 0), (None, 1), (7, 7), (None, 8)):
+        observations = env.reset(seed=seed)[0].values()
+        blind = [row for row, observation in enumerate(observations) if not observation.any()]
+        assert blind == [*failing_rows(expected, 9, 1)]
+
+
+class Asked(Lane):
+    """Keeps what it was asked to begin with."""
+
+    def reset(self, seed: int | None = None, options: Any = None) -> Any:
+        self.asked = seed, options
+        return super().reset(seed, options)
+
+
+@pytest.mark.parametrize(
+    "wrapped",
+    [
+        PaddedAgents(Asked(2)),
+        FailingRobots(Asked(2), [], FAILURES),
+        ChangingAgents(Asked, [2]),
+    ],
+)
+def test_seed_and_options_reach_the_environment(wrapped: Any) -> None:
+    observations, infos = wrapped.reset(seed=3, options={"goal": 1})
+    assert wrapped.unwrapped.asked == (3, {"goal": 1})
+    assert [*observations] == [*infos] == ["robot_0", "robot_1"]
 
 
 class Nested(Lane):
@@ -192,6 +227,14 @@ def test_the_number_of_agents_is_drawn_for_each_episode() -> None:
         assert {a: v.tolist() for a, v in seen.items()} == {
             a: v.tolist() for a, v in seen_again.items()
         }
+    first_seeds = set()
+    for asked in (ChangingAgents(Asked, [2]) for _ in range(9)):
+        asked.reset()
+        first_seeds.add(asked.unwrapped.asked[0])
+    assert len(first_seeds) > 4
+    for seed, expected in ((3, 3), (None, 4), (None, 5), (0, 0), (None, 1)):
+        asked.reset(seed=seed)
+        assert asked.unwrapped.asked == (expected, None)
     with pytest.raises(SetupError, match="should be one number of agents or more"):
         ChangingAgents(Lane, [])
     with pytest.raises(SetupError, match=r"make_env\(1\) has robot_0: should be"):

@@ -56,10 +56,69 @@ def test_p_is_the_measure_or_how_far_it_is_from_its_worst_value(text: str, p: fl
     )  # fmt: skip
     is_capped = performance.measure != "longest_standstill"
     assert performance.is_capped(perfect) == is_capped
+    p_of_perfect = {"on_time": 4.0, "longest_standstill": 0.001}.get(performance.measure, 1.0)
+    assert performance.of_run(perfect) == pytest.approx(p_of_perfect)
     # Where no order was due none was late, and none on time.
     idle = Outcome(delivery_times=np.array([99.9]), ended_at=100.0)
     if MEASURES[performance.measure].needs:
         assert performance.of_run(idle) == (0.0 if text == "on_time" else 1.0)
+
+
+LATE = "the time by which orders were late"
+DUE = "orders that were served by their due time"
+
+
+@pytest.mark.parametrize(
+    ("text", "words", "counted", "largest"),
+    [
+        ("on_time", f"the number of {DUE}", "orders", None),
+        ("share_on_time", f"the share of the {DUE}", "", 1.0),
+        (
+            "mean_tardiness:60",
+            "1 - x / 60 s, at least 0; x is the mean time by which orders were late",
+            "",
+            1.0,
+        ),
+        (
+            "p95_tardiness:2.5",
+            f"1 - x / 2.5 s, at least 0; x is the 95th percentile of {LATE}",
+            "",
+            1,
+        ),
+        (
+            "longest_queue:9",
+            (
+                "1 - x / 9 orders, at least 0; x is the largest number of orders that were open or "
+                "waited"
+            ),
+            "",
+            1.0,
+        ),
+        (
+            "longest_standstill:9",
+            "1 - x / 9 s, at least 0; x is the longest time without a delivery",
+            "",
+            1.0,
+        ),
+        (
+            "stands_still",
+            (
+                "share of runs that do not stand still: 1 where something was delivered in the "
+                "last fifth, or nothing was left, else 0"
+            ),
+            "",
+            1.0,
+        ),
+    ],
+)
+def test_a_measure_tells_what_p_is_what_it_counts_and_how_large_it_can_be(
+    text: str, words: str, counted: str, largest: float | None
+) -> None:
+    performance = Performance.of(text)
+    assert isinstance(performance, Performance)
+    assert Performance.of(performance) is performance
+    assert (performance.words, performance.counted) == (words, counted)
+    assert performance.largest == largest
 
 
 @pytest.mark.parametrize(
@@ -69,6 +128,9 @@ def test_p_is_the_measure_or_how_far_it_is_from_its_worst_value(text: str, p: fl
         ("mean_tardiness", "which value counts as P = 0, e.g. 'mean_tardiness:60' [s]"),
         ("on_time:4", "has no worst value: should be 'on_time'"),
         ("longest_queue:0", "greater than 0"),
+        ("share_on_time:1", "has no worst value: should be 'share_on_time'"),
+        ("stands_still:1", "has no worst value: should be 'stands_still'"),
+        ("longest_queue", "less of longest_queue is better: should say which value counts as P = "),
     ],
 )
 def test_a_measure_that_cannot_be_p_is_refused(text: str, words: str) -> None:
@@ -83,6 +145,10 @@ def test_a_condition_without_the_measure_is_refused_before_it_is_played() -> Non
         Study(performance="on_time", **FAULTS).plan()
     with pytest.raises(StudyError, match="'longest_queue:9': orders = 'next': should be set"):
         Study(performance="longest_queue:9", **FAULTS).plan()
+    # Without due times orders wait all the same.
+    assert (
+        Study(performance="longest_queue:9", scenario={"orders": "poisson"}, **FAULTS).plan().cases
+    )
     listed = {"orders": "time,item/0,4/5,2", "order_due": 30.0}  # a file says itself what is due
     with pytest.raises(StudyError, match="no row of the file of orders has a due time"):
         Study(performance="p95_tardiness:60", scenario=listed, **FAULTS).plan()

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 import subprocess
 import sys
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,7 +17,7 @@ from swarm_logistics_env import Scenario, policies
 from swarm_logistics_env.core.errors import ScenarioError, StudyError
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.study.studies import Study
-from swarm_logistics_env.study.tasks.task import Case
+from swarm_logistics_env.study.tasks.task import Case, Run, digest_of, refuse_untrusted, task_of
 from swarm_logistics_env.study.tasks.warehouse_task import (
     CLEARING,
     EPISODE_CODE,
@@ -57,6 +60,50 @@ def test_whatever_is_code_in_a_file_is_refused(line: str, name: str, tmp_path: P
         Study.from_file(tmp_path / "mine.toml")
 
 
+def test_a_task_is_known_by_a_name_an_import_path_or_itself() -> None:
+    for source, task in (
+        ("warehouse", WAREHOUSE), ("clearing", CLEARING), ("recorded trials", RECORDED),
+        ("tests.study.tasks.lane:LANE", LANE), (LANE, LANE),
+    ):  # fmt: skip
+        assert task_of(source) is task
+    with pytest.raises(
+        StudyError, match=r"^3 is no task: should have the attributes of tasks\.Task$"
+    ):
+        task_of(3)
+    missing = (
+        "task 'tests.study.tasks.lane:ALNE' cannot be imported: module 'tests.study.tasks.lane"
+    )
+    with pytest.raises(StudyError, match=f"^{missing}' has no attribute 'ALNE'$"):
+        task_of("tests.study.tasks.lane:ALNE")
+
+
+@pytest.mark.parametrize(
+    ("task", "policies", "bodies", "name"),
+    [
+        ("mine:T", ("mine:P",), ["mine:B"], "task 'mine:T'"),
+        ("warehouse", ("homing", "mine:P"), ["mine:B"], "policy 'mine:P'"),
+        (None, ("homing",), ["dots", "mine:B"], "bodies 'mine:B'"),
+        (None, ("model.zip",), (), "policy 'model.zip'"),
+        ("warehouse", ("homing",), ["dots"], None),
+    ],
+)
+def test_the_first_that_is_code_is_refused_by_its_name_unless_it_is_trusted(
+    task: str | None, policies: tuple[str, ...], bodies: Sequence[str], name: str | None
+) -> None:
+    specs = tuple(PolicySpec(name=policy) for policy in policies)
+    path = Path("study.toml")
+    refuse_untrusted(path, task, specs, bodies, trust_code=True)
+    if name is None:
+        refuse_untrusted(path, task, specs, bodies, trust_code=False)
+        return
+    with pytest.raises(StudyError) as refused:
+        refuse_untrusted(path, task, specs, bodies, trust_code=False)
+    assert str(refused.value) == (
+        f"study.toml: {name} is code, which runs when it is loaded: should be a name that the "
+        "package knows, or be allowed by --trust-code (trust_code=True)"
+    )
+
+
 def test_the_warehouse_is_varied_by_presets_and_its_cases_are_its_own() -> None:
     case, lane_case = (
         Case(PolicySpec(name="x"), "x", Scenario(), task=t) for t in (WAREHOUSE, LANE)
@@ -67,6 +114,44 @@ def test_the_warehouse_is_varied_by_presets_and_its_cases_are_its_own() -> None:
         WAREHOUSE.vary(Scenario(), {"preset": "dot"})
     words = "max_acceleration=3.0), batteries of 71900 J, charging stations: 4"
     assert WAREHOUSE.world_in_words(Scenario.preset("day")).endswith(words)
+
+
+def test_a_report_states_the_conditions_of_the_environment() -> None:
+    assert LANE.vary(LANE.default, {"length": 8.0, "n_robots": 2}).conditions() == [
+        ("n_robots", "2", "robots"),
+        ("duration", "40.0", "s"),
+        ("length", "8", "argument of the environment"),
+    ]
+
+
+def test_the_content_of_a_case_is_all_that_decides_its_outcomes() -> None:
+    faults = (LANE.fault("blind", 1, 2.0, None, {}),)
+    fields = '{"duration":40.0,"length":6,"n_robots":4}'
+    fault = '[{"duration":null,"mode":"blind","onset":2.0,"robots":1}]'
+    case = Case(PolicySpec(name="x"), "id", LANE.default, faults, 2, task=LANE)
+    assert case.content == (fields, fault, "id", "2", "task lane")
+    assert replace(case, faults=(), behaviour=0).content == (fields, "[]", "id", "task lane")
+    assert replace(case, task=WAREHOUSE).content == (fields, fault, "id", "2")
+    assert case.key == digest_of(*case.content)
+    assert Run(case, "code", 7).key == digest_of(*case.content, "code", "7")
+    assert case.trainings == (case,)
+    recipe = PolicySpec.of("ppo-robust@all")
+    planned = [["ppo-robust@1", "a"], ["ppo-robust@2", "b"]]
+    trainings = replace(case, policy=recipe, identity=json.dumps(planned)).trainings
+    assert [[training.policy.name, training.identity] for training in trainings] == planned
+
+
+def test_the_seed_of_a_policy_is_that_of_the_run_unless_its_behaviour_is_another() -> None:
+    case = Case(PolicySpec(name="x"), "x", Scenario(), task=WAREHOUSE)
+    seeds = [
+        Run(replace(case, behaviour=behaviour), "code", seed).policy_seed
+        for behaviour, seed in ((0, 7), (1, 7), (2, 7), (1, 8))
+    ]
+    assert seeds[0] == 7
+    assert len(set(seeds)) == 4
+    assert all(0 <= seed < 2**31 for seed in seeds)
+    many = [Run(replace(case, behaviour=1), "code", seed).policy_seed for seed in range(40)]
+    assert max(many) >= 2**30
 
 
 def test_covers_all_that_an_episode_loads() -> None:

@@ -14,6 +14,14 @@ DAY = "policy,robots,delivered\nA,10,20\nA,10,21\nA,5,12\nA,5,11\n"
 OTHER_DAY = DAY.replace("20", "25")
 
 
+UNKNOWN = "is left out: none of its columns is known:"
+NO_RESULTS = (
+    "config.json is left out: it should be results as POGEMA writes them (a list of metrics, "
+    "env_grid_search and algorithm) or as marl-eval does (environment > task > algorithm > run); "
+    "else save the trials as CSV."
+)
+
+
 def write(folder: Path, **files: str) -> Path:
     for name, content in files.items():
         path = folder / name
@@ -30,13 +38,19 @@ def write(folder: Path, **files: str) -> Path:
         ("._day1.csv", "\x00\x05", ""),
         ("__MACOSX/day1.csv", "\x00", ""),
         ("Thumbs.db", "", ""),
-        ("README.txt", "Trials of May.\n\nSee the lab book.\n", "README.txt is left out: none of"),
+        (
+            "README.txt",
+            "Trials of May.\n\nSee the lab book.\n",
+            f"README.txt {UNKNOWN} 'Trials of May.'.",
+        ),
         ("README.txt", 'In May, we\n"go, and\n', "README.txt is left out: it is no table."),
-        ("config.json", '{"speed": 1.0}', "config.json is left out: it should be results as PO"),
-        ("battery.csv", "voltage,current\n1,2\n", "battery.csv is left out: none of its columns"),
+        ("config.json", '{"speed": 1.0}', NO_RESULTS),
+        ("battery.csv", "voltage,current\n1,2\n", f"battery.csv {UNKNOWN} 'voltage', 'current'."),
+        ("b.csv", "a,b,c,d,e,f\n1,2,3,4,5,6\n", f"b.csv {UNKNOWN} 'a', 'b', 'c', 'd', 'e'."),
         ("day2.csv", "", "day2.csv is left out: it is empty."),
         ("day2.csv", "policy,robots,delivered\n", "day2.csv is left out: it holds no trial."),
         ("plot.png", "", "Files of other kinds are left out: plot.png."),
+        ("old/plot.png", "", "Files of other kinds are left out: old/plot.png."),
     ],
 )
 def test_what_holds_no_trials_is_left_out(
@@ -45,13 +59,14 @@ def test_what_holds_no_trials_is_left_out(
     write(tmp_path, **{"day1.csv": DAY, name: content})
     trials = read_trials(tmp_path)
     assert len(trials.rows) == 4
-    assert trials.notes[0] == "The folder holds 1 file: 4 rows."
-    assert len(trials.notes) == 1 + bool(note)
-    assert trials.notes[-1].startswith(note)
+    assert trials.notes == ("The folder holds 1 file: 4 rows.", *([note] if note else []))
     (tmp_path / "day1.csv").unlink()
-    with pytest.raises(spi.IndicatorError, match="holds no trials: should hold files of") as caught:
+    with pytest.raises(spi.IndicatorError) as caught:
         read_trials(tmp_path)
-    assert note in str(caught.value)
+    assert str(caught.value) == (
+        f"{tmp_path} holds no trials: should hold files of .csv, .tsv, .txt, .json, .xlsx, .xlsm, "
+        f".parquet{f'; --column says what a column is. {note}' if note else ''}"
+    )
 
 
 def test_trials_that_cannot_be_read_are_never_left_out(tmp_path: Path) -> None:
@@ -127,8 +142,24 @@ def test_a_column_that_is_left_out_need_not_be_in_all_files(tmp_path: Path) -> N
 
 def test_files_whose_names_say_different_things_are_refused(tmp_path: Path) -> None:
     write(tmp_path, **{"day=1.csv": DAY, "other.csv": OTHER_DAY})
-    with pytest.raises(spi.IndicatorError, match=r"other\.csv names nothing, but .*1\.csv day$"):
+    with pytest.raises(spi.IndicatorError) as caught:
         read_trials(tmp_path)
+    first = tmp_path / "day=1.csv"
+    assert str(caught.value) == f"{tmp_path / 'other.csv'} names nothing, but {first} day"
+
+
+def test_folders_name_policies_and_values_and_rows_are_counted_through(tmp_path: Path) -> None:
+    sized = {f"{policy}/width={width}/map= hall .csv": "robots,P\n4,1\n8,2\n"
+             for policy, width in (("ours", 2), ("base", 3))}  # fmt: skip
+    trials = read_trials(write(tmp_path / "lab", **sized))
+    assert (trials.file, trials.notes[0]) == ("lab", "The folder holds 2 files: 4 rows.")
+    assert [(row.policy, row.n_robots, row.line, row.parameters) for row in trials.rows] == [
+        ("base", 4, 1, (("width", 3.0),)), ("base", 8, 2, (("width", 3.0),)),
+        ("ours", 4, 3, (("width", 2.0),)), ("ours", 8, 4, (("width", 2.0),)),
+    ]  # fmt: skip
+    wrong = write(tmp_path / "wrong", **{"a/b.csv": "robots,P\n4,1\n8,two\n"})
+    with pytest.raises(spi.IndicatorError, match=r"^.*a/b\.csv, line 3, column 'P': 'two': should"):
+        read_trials(wrong)
 
 
 def test_a_file_whose_columns_are_named_by_hand_counts(tmp_path: Path) -> None:

@@ -313,6 +313,8 @@ def test_cells_are_replaced_where_somebody_says_so(tmp_path: Path) -> None:
     for values in (["fault:kein=none", "P:NA=0"], ["failure:kein=none", "performance:NA=0"]):
         trials = read_trials(path, values=values)
         assert [(row.fault, row.performance) for row in trials.rows] == [("none", 0), ("Rad", 3)]
+    exchanged = ["fault:kein=Rad", "fault:Rad=kein", "m:=1", "m:1=0", "P:NA=0"]
+    assert [row.fault for row in read_trials(path, values=exchanged).rows] == ["Rad", "none"]
     for value, words in (
         ("kein=none", "should be COLUMN:CELL=NEW"),
         ("fault:keine=none", "has no cell 'keine' in the column 'fault'"),

@@ -112,6 +112,7 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
             "robots;p\n4;980\n4;1.200\n",
             "line 3, column 'p': '1.200': is 1200 or 1.2, beside 980 in",
         ),
+        ("robots;p\n4;10\n4;2\n4;1.000\n", "line 4, column 'p': '1.000': is 1000 or 1, beside 10"),
         (
             "robots;p;x\n4;1;980\n4;2;1.250\n",
             "line 3, column 'x': '1.250': is 1250 or 1.25, beside",
@@ -240,6 +241,7 @@ def test_a_point_may_stand_before_three_decimals(tmp_path: Path) -> None:
         ("robots;p\n4;980\n4;1.200\n", {"decimal": "."}),
         ("robots;p\n4;980\n4;1.25\n4;1.200\n", {}),
         ("robots;p\n4;2\n4;1.125\n", {}),
+        ("robots;p\n4;9\n4;1.000\n", {}),
         ("robots;p\n4;9\n4;0.125\n", {}),
     ):
         written = re.findall(r";([\d.]+)", text)

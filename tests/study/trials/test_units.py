@@ -23,7 +23,11 @@ def read(tmp_path: Path, text: str, **columns: str) -> Trials:
         *((name, "2.5") for name in ("Dauer [min]", "minutes", "Zeit / min", "tiempo (minutos)")),
         *((name, "150000") for name in ("time (ms)", "time_ms", "t_ms", "T [MS]", "timeMs")),
         *((name, "150") for name in ("time", "time [s]", "Zeit [Sek.]", "time (seconds)", "t [s]")),
-        ("time [h]", "0.041666666666666666"),
+        *((name, "0.041666666666666666") for name in ("time [h]", "temps [heures]", "time_hrs")),
+        *((name, "0.001736111111111111") for name in ("time [d]", "Zeit [Tage]", "days to clear")),
+        *((name, "150000000") for name in ("time [µs]", "time [us]", "time_usec")),
+        *((name, "150") for name in ("tiempo [segundos]", "tempo [secondi]", "Sekunden")),
+        *((name, "150000") for name in ("milisegundos", "Zeit [Millisekunden]")),
     ],
 )
 def test_times_are_converted_to_seconds(tmp_path: Path, name: str, time: str) -> None:

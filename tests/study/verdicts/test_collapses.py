@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.stats import binomtest
 
 from swarm_logistics_env import judge
-from swarm_logistics_env.spi import Phases
+from swarm_logistics_env.spi import Interval, Phases
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.answer_notes import collapsed_in_words
-from swarm_logistics_env.study.report.tables import critical_size_in_words
-from swarm_logistics_env.study.verdicts.collapses import collapses, edges
+from swarm_logistics_env.study.report.tables import critical_size_in_words, further_tables
+from swarm_logistics_env.study.verdicts.collapses import Edge, collapses, edges
+
+WITHOUT_INTERVAL = (
+    "Half of the runs collapse at about N = 8, without interval: the sizes do not show both that "
+    "few and that nearly all runs collapse"
+)
 
 
 def test_runs_that_break_off_are_told_from_those_that_never_began() -> None:
@@ -36,6 +43,25 @@ def test_runs_that_break_off_are_told_from_those_that_never_began() -> None:
         np.testing.assert_allclose(collapse.breaks, 100.0, atol=20.0)
     words = collapsed_in_words(named, names_policies=False)
     assert "26 % [11, 46] (of these 3 of 7 in mid-run, after 9" in words
+
+
+def test_a_run_breaks_off_at_its_last_delivery_if_it_was_as_fast_as_others() -> None:
+    """Runs deliver in steps [s] from the first time on; two stop, and two are slow."""
+    steady = [np.arange(5.0, 500.0, 500.0 / (95 + run)) for run in range(20)]
+    broken = [np.arange(4.0, 101.0, 4.0), np.arange(4.0, 61.0, 4.0)]
+    others = [np.arange(10.0, 500.0, 25.0), np.arange(20.0, 181.0, 20.0), np.arange(402, 500, 4)]
+    rows = [
+        (robots, run, time, 500.0)
+        for run, times in enumerate([*steady, *broken, *others])
+        for robots in (4, 8)
+        for time in times
+    ]
+    frame = pd.DataFrame(rows, columns=["robots", "run", "time", "duration"])
+    for collapse in judge(frame).collapses:
+        assert (collapse.n_collapsed, collapse.share.value) == (5, 0.2)
+        assert collapse.breaks.tolist() == [60.0, 100.0]
+        words = collapsed_in_words([collapse], names_policies=False)
+        assert words.endswith(" in 20 % [7, 41] (of these 2 of 5 in mid-run, after 80 s (median))")
 
 
 @pytest.mark.parametrize(
@@ -81,6 +107,11 @@ def test_shares_of_collapsed_runs_have_exact_intervals_by_size() -> None:
     assert edge.size.value == pytest.approx(8.0)
     (edge_of_two,) = edges(judge(frame[frame.robots < 16]).cells)
     assert edge_of_two.shares == edge.shares[:2]
+    # S of 5 robots and of 99.5 items beside a part of these, and beside none of them.
+    assert [*edge.scalabilities(edge.good_runs)] == [None, 94.5 / 99.5 - 1.0, None]
+    all_runs = [cell.by_seed for cell in edge.cells]
+    assert [*edge.scalabilities(all_runs)] == [None, 49.75 / 99.5 - 1.0, 5.0 / 49.75 - 1.0]
+    assert [*edge.scalabilities([np.zeros(2), np.ones(2), 4.0 * np.ones(2)])] == [None, None, 3.0]
 
 
 def test_the_critical_size_is_said_with_its_interval() -> None:
@@ -88,8 +119,42 @@ def test_the_critical_size_is_said_with_its_interval() -> None:
     bad = [3, 4, 5, 6, 7] * 6
     p = good * 2 + good[:15] + bad[:15] + bad * 2
     frame = pd.DataFrame({"robots": np.repeat([10, 14, 20, 28, 40], 30), "P": p})
-    (edge,) = edges(judge(frame).cells)
+    results = judge(frame)
+    (edge,) = edges(results.cells)
     assert critical_size_in_words(edge) == "Half of the runs collapse at N = 20 [17, 23]"
+    (table,) = (t for t in further_tables(results) if "near the edge" in t.title)
+    assert table.title == "data frame: how near the edge, Scalability"
+    assert table.columns == (
+        *("N", "runs collapsed, 95 %", "S of all runs", "S of the runs that did not"),
+    )
+    assert [" | ".join(row) for row in table.rows] == [
+        "N = 10 | 0 % [0, 12] | – | –",
+        "N = 14 | 0 % [0, 12] | 0.000 | 0.000",
+        "N = 20 | 50 % [31, 69] | -1.195 | -0.167",
+        "N = 28 | 100 % [88, 100] | -2.255 | –",
+        "N = 40 | 100 % [88, 100] | 0.000 | –",
+    ]
+    (line,) = table.lines
+    assert line == (
+        f"{critical_size_in_words(edge)} (logistic in log N, quasi-likelihood). Two phases are "
+        "named where a test with 5 % of error over the sizes says so; the other sizes are told by "
+        "the one that shows them most clearly."
+    )
+
+
+@pytest.mark.parametrize(
+    ("size", "words"),
+    [
+        (Interval(9.0, 0.0, math.inf), "Less than half of the runs collapse up to N = 8"),
+        (Interval(8.0, 5.5, 9.5), "Half of the runs collapse at N = 8 [6, 10]"),
+        (Interval(8.0, 0.0, 9.0), "Half of the runs collapse at N = 8 [0, 9]"),
+        (Interval(7.6, 0.0, math.inf), WITHOUT_INTERVAL),
+    ],
+)
+def test_no_critical_size_is_told_beyond_the_largest(size: Interval, words: str) -> None:
+    frame = pd.DataFrame({"robots": [4, 8] * 5, "P": range(10)})
+    cells = judge(frame).cells
+    assert critical_size_in_words(Edge(cells, (), (), size)) == words
 
 
 def test_counts_too_small_for_phases_are_untestable_in_answer_and_table() -> None:

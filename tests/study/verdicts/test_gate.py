@@ -60,9 +60,18 @@ def test_a_gate_names_the_verdicts_that_fail_or_is_refused() -> None:
     gate, above = Gate.parse("possibly R < 0"), Gate.parse("possibly  change>-1e-1 at N = 5")
     assert [gate.fails_on(v) for v in ("supported", "open", "refuted")] == [0, 1, 1]
     assert [above.fails_on(v) for v in ("supported", "open", "refuted")] == [1, 1, 0]
+    assert gate == ("possibly R < 0", True, "R", True, 0.0, "")
+    assert above[1:] == (True, "change", False, -0.1, "N = 5")
+    assert Gate.parse(" FT > .5 ") == ("FT > .5", False, "FT", False, 0.5, "")
+    assert [gate.holds_for(value) for value in (-0.1, 0.0, 0.1)] == [True, False, False]
+    assert [above.holds_for(value) for value in (-0.2, -0.1, 0.1)] == [False, False, True]
     for text in ("", "R <", "R <= 0", "Q < 0", "R < 0 and S < 0", "R < nan"):
-        with pytest.raises(StudyError, match="should be"):
+        with pytest.raises(StudyError) as refusal:
             Gate.parse(text)
+        assert str(refusal.value) == (
+            f"gate {text!r}: should be [possibly] S|FT|R|A|change <|> NUMBER [at TEXT], e.g. "
+            '"R < 0" or "possibly change < -0.1 at N = 25"'
+        )
 
 
 @pytest.mark.unmeasured
@@ -149,12 +158,18 @@ def test_runs_are_paired_by_their_seeds_and_not_by_their_place() -> None:
         assert answer.estimate.n_seeds == 4
         assert (answer.estimate.pairing_correlation or 0.0) > 0.9
         assert answer.fails
-    only_old, only_new = match(old, new).notes
-    assert "left out: seeds 0 to 1." in only_old
-    assert "left out: seeds 6 to 7." in only_new
+    assert match(old, new).seeds == (2, 3, 4, 5)
+    damaged, only_old, only_new = match(replace(old, damage="A row is damaged"), new).notes
+    assert damaged == "A row is damaged."
+    shared = "Runs are paired over the shared seeds, 2 to 5."
+    assert only_old == f"Only in the old study, and left out: seeds 0 to 1. {shared}"
+    assert only_new == f"Only in the new study, and left out: seeds 6 to 7. {shared}"
     (answer,) = answers(Gate.parse("change < 0 at N = 20"), old, results(WELL, first_seed=100))
     assert answer.fails
-    assert "share no seed" in str(answer.problem)
+    assert answer.problem == (
+        "the studies share no seed: the old one has 0 to 5, the new one 100 to 105; play one of "
+        "them on the other's seeds"
+    )
 
 
 def test_an_ablation_s_policy_is_not_compared() -> None:
@@ -164,6 +179,7 @@ def test_an_ablation_s_policy_is_not_compared() -> None:
     gate_answers = answers(Gate.parse("change < 0"), old, new)
     assert {a.name.split(": ")[0] for a in gate_answers} == {"swarm-dt -> random-walk"}
     assert len(gate_answers) == 4
+    assert gate_answers[0].name == "swarm-dt -> random-walk: change, N = 10 (Scalability)"
     assert any(answer.fails for answer in gate_answers)
 
 
@@ -171,7 +187,11 @@ def test_a_judged_policy_without_a_match_fails_and_is_named() -> None:
     single, both = results(WELL), results(WELL, policies=["swarm-dt", "random-walk"])
     for old, new in ((single, both), (both, single)):
         (failing,) = (a for a in answers(Gate.parse("change < 0"), old, new) if a.fails)
-        assert "policy 'random-walk' is judged under no condition of both" in str(failing.problem)
+        assert failing.name == "random-walk: change"
+        assert failing.problem == (
+            "policy 'random-walk' is judged under no condition of both studies: the old one judges "
+            f"{[*old.policies]}, the new one {[*new.policies]}"
+        )
         # A gate on the other policy alone is answered.
         assert not fails("change < 0 at swarm-dt", old, new)
         assert fails("change < 0 at random-walk", old, new)
@@ -199,9 +219,14 @@ def test_what_cannot_be_judged_fails_and_a_gate_on_nothing_is_refused() -> None:
         (answer,) = answers(Gate.parse(gate), old, new)
         assert answer.fails
         assert words in str(answer.problem)
+        assert (answer.estimate, answer.verdict, answer.exact) == (None, None, None)
+    assert answer.name == "swarm-dt: R, FM1, m = 1 (Fault tolerance and robustness)"
     for text in ("A < 0", "R < 0 at FM4"):
-        with pytest.raises(StudyError, match="tests nothing"):
+        with pytest.raises(StudyError) as refusal:
             answers(Gate.parse(text), old, old)
+        assert str(refusal.value) == (
+            f"gate {text!r}: the studies hold nothing that it names, so it tests nothing"
+        )
 
 
 def test_a_gate_on_what_cannot_be_passes() -> None:

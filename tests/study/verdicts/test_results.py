@@ -6,8 +6,10 @@ import math
 from dataclasses import asdict, replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from swarm_logistics_env import judge as judge_trials
 from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.questions.declaration import Declaration
 from swarm_logistics_env.study.report.answer_notes import warnings
@@ -210,3 +212,68 @@ def test_a_study_that_is_called_as_its_policy_names_it_all_the_same() -> None:
     results = judged(study, lambda _, setting, seed: delivered(setting.value or 5 + seed))
     assert results.policies == ("homing",)
     assert not results.names_no_policy
+
+
+@pytest.mark.parametrize(
+    ("column", "names", "words"),
+    [
+        ("map", {4: ["roof", "hall", "yard"]}, "3 paired blocks (hall to yard)"),
+        ("seed", {4: [3, 4, 5, 9]}, "4 paired seeds (3 to 5, 9)"),
+        ("seed", {4: [3]}, "one seed (3)"),
+        (None, {4: ["", "", ""]}, "3 unpaired runs a condition"),
+        (None, {4: ["", "", ""], 8: [""]}, "1 to 3 unpaired runs a condition"),
+        (None, {4: [""]}, "1 unpaired run a condition"),
+    ],
+)
+def test_results_say_over_which_trials_they_are(
+    column: str | None, names: dict[int, list[str | int]], words: str
+) -> None:
+    runs = {8: names[4], **names}
+    rows = [(n, name, 2 * n + k) for n, of_size in runs.items() for k, name in enumerate(of_size)]
+    trials = pd.DataFrame(rows, columns=["robots", column or "note", "P"])
+    assert judge_trials(trials if column else trials[["robots", "P"]]).seeds_text == words
+
+
+CELL = """
+policy=swarm-dt table=Table II: fault tolerance and robustness cell=FM4, m = 3 kind=fault
+factor=FM4 value=3 onset=0 n_robots=25 published=12 counted=True n_seeds=10 mean=11.9 low=11.4
+high=12.4 prediction_low=10.1 prediction_high=13.7 confidence=0.95 published_inside=True
+saturated=True stalled=0 standstill=1 standstills=0 phases_untestable=fewer than 10 runs lie below
+the largest P contacts=2 contacts_low=2 contacts_high=2 fast_contacts=0.5 overlap_share=0.1
+mean_acceleration=6 p95_acceleration=15 on_time=0.9 share_on_time=0.5 mean_tardiness=3
+p95_tardiness=9 longest_queue=4 turned_away=0.5 put_back=2 all_served=0.3 problem=None
+"""
+VERDICT = """
+policy=swarm-dt table=Table II: fault tolerance and robustness indicator=FT comparison=FM4, m = 3
+kind=fault factor=FM4 before=0 after=3 onset=0 n_robots=25 threshold=0 value=-0.594 low=-0.63
+high=-0.559 confidence=0.95 probability=1.49e-11 p_value=2.99e-11 p_seen=2.5e-11 p_holm=3.59e-10
+verdict=refuted verdict_holm=refuted n_seeds=10 n_trainings=nan collapsed=nan collapsed_upper=nan
+stopped_at=nan pairing_correlation=-0.602 flags= saturated=False property=tolerant answer=refuted
+answer_holm=refuted conclusion=refuted in_words=refuted claim=not tolerant published=-0.615
+claim_verdict=supported claim_verdict_holm=supported unchanged=P_F and P_S differ by less than 10 %
+of P_o margin=0.1 change=-0.594 change_low=-0.623 change_high=-0.565 change_confidence=0.9
+p_unchanged=1.18e-10 equivalence=refuted equivalence_holm=refuted detectable=0.142
+seeds_for_power_80=10 problem=None
+"""
+
+
+def test_the_tables_say_all_of_a_cell_and_of_a_verdict(paper_results: StudyResults) -> None:
+    def in_words(table: pd.DataFrame) -> str:
+        (row,) = table.to_dict("records")
+        values = {n: f"{x:.3g}" if isinstance(x, float) else x for n, x in row.items()}
+        return " ".join(f"{name}={value}" for name, value in values.items())
+
+    (cell,) = (cell for cell in paper_results.cells if cell.words == "FM4, m = 3")
+    contacts = asdict(ContactMeasures(2.0, 0.5, 0.1, 6.0, 15.0))
+    outcomes = tuple(
+        replace(
+            outcome, **contacts, on_time=run % 3, share_on_time=0.5, mean_tardiness=3.0,
+            p95_tardiness=9.0, longest_queue=4, turned_away=run % 2, put_back=run % 5,
+            all_served=run < 3,
+        )
+        for run, outcome in enumerate(cell.outcomes)
+    )  # fmt: skip
+    measured = replace(cell, outcomes=outcomes)
+    assert in_words(frame([measured], CELL_COLUMNS)) == " ".join(CELL.split())
+    verdict = by_question(paper_results)["FT", "FM4, m = 3", 0.0]
+    assert in_words(frame([verdict], VERDICT_COLUMNS)) == " ".join(VERDICT.split())

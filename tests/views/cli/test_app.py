@@ -164,6 +164,9 @@ class Lazy:
     def act(self, observations): return np.zeros((len(observations), 4))
 class Torn(Lazy):
     def act(self, observations): raise ZeroDivisionError('the motor is gone')
+def stop(observations): raise ZeroDivisionError('the motor is gone')
+class Generated(Lazy):
+    exec("def act(self, observations): return stop(observations)")
 class Leaving(Lazy):
     def act(self, observations): raise SystemExit(0)
 class Unmade(Lazy):
@@ -182,11 +185,12 @@ def test_a_policy_of_ones_own_that_cannot_be_made_is_one_sentence(
     ):
         assert reason in command(f"run --policy {name} {SMALL}", code=2)
     # Its traceback says where, without the frames that called it.
-    assert app.run(f"run --policy own_policy:Torn {SMALL}".split()) == 1
-    printed = capsys.readouterr().err.splitlines()
-    assert printed[-1] == "ZeroDivisionError: the motor is gone"
-    (frame,) = [line for line in printed if line.startswith("  File")]
-    assert "own_policy.py" in frame
+    for name in ("Torn", "Generated"):
+        assert app.run(f"run --policy own_policy:{name} {SMALL}".split()) == 1
+        printed = capsys.readouterr().err.splitlines()
+        assert printed[-1] == "ZeroDivisionError: the motor is gone"
+        (frame,) = [line for line in printed if line.startswith("  File")]
+        assert "own_policy.py" in frame
     with pytest.raises(RuntimeError, match=r"called sys.exit\(\)"):
         command(f"run --policy own_policy:Leaving {SMALL}")
 

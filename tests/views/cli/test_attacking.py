@@ -1,4 +1,4 @@
-"""`attack`: what it leaves when it is stopped."""
+"""`attack`: what it searches, and what it leaves when it is stopped."""
 
 from __future__ import annotations
 
@@ -6,20 +6,41 @@ from pathlib import Path
 
 import pytest
 
+from swarm_logistics_env import Scenario
 from swarm_logistics_env.study import attack
+from swarm_logistics_env.study.attack import Attack
 from swarm_logistics_env.views.cli import app
 
+OPTIONS = "--robots 3 --mode FM1 --mode FM4 --budget 90 --fresh 8 --seed 5 --set n_robots=9"
 
-@pytest.mark.parametrize("option", ["", "--out mine"])
+
+@pytest.mark.parametrize(
+    ("options", "search"),
+    [
+        ("", Attack(policy="homing", scenario=Scenario())),
+        (
+            f"{OPTIONS} --out mine",
+            Attack(
+                policy="homing", scenario=Scenario(n_robots=9), robots=3, modes=("FM1", "FM4"),
+                budget=90, fresh=8, seed=5,
+            ),
+        ),
+    ],
+)  # fmt: skip
 def test_a_search_that_is_stopped_says_where_it_is_kept(
-    option: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    options: str,
+    search: Attack,
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def stop(*_: object) -> None:
+    def stop(what: Attack, engine: object, out: Path) -> None:
+        assert (what, str(out)) == (search, directory)
         raise KeyboardInterrupt
 
+    directory = "mine" if options else str(Path("results", "attack-homing"))
     monkeypatch.setattr(attack, "attack", stop)
-    assert app.run(["attack", "homing", *option.split()]) == 130
-    directory = "mine" if option else Path("results", "attack-homing")
+    assert app.run(["attack", "homing", *options.split()]) == 130
     assert capsys.readouterr().err == (
         f"\nStopped. What is finished is kept in {directory}; the same command goes on.\n"
     )

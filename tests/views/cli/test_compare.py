@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.views.cli import app
 from tests.conftest import SMALL
 from tests.views.cli.conftest import Command
 
@@ -74,7 +75,9 @@ def imported(command: Command, name: str, faulty: tuple[int, ...], first: int = 
     command(f"judge {name}.csv --out {name}")
 
 
-def test_recorded_trials_are_gated_and_paired_by_the_seeds_of_their_files(command: Command) -> None:
+def test_recorded_trials_are_gated_and_paired_by_the_seeds_of_their_files(
+    command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
     imported(command, "old", (40, 41, 43, 42))
     imported(command, "new", (20, 22, 21, 23))
     imported(command, "late", (44, 41, 41, 42), first=2)
@@ -87,6 +90,26 @@ def test_recorded_trials_are_gated_and_paired_by_the_seeds_of_their_files(comman
         ("old new --fail-if S<0", 2, "tests nothing"),
     ):
         assert words in command(f"study compare {arguments}", code=code)
+    columns = "|  | value [95 %] | verdict under Holm |\n| --- | --- | --- |\n"
+    fault = "FM1, m = 1 (Fault tolerance and robustness)"
+    robustness = f"| new: R, {fault} | -0.442 [-0.474, -0.408] | above 0: refuted |\n\n"
+    change = f"| old -> new: change, {fault} | -0.482 [-0.526, -0.434] | above 0.1: refuted |\n\n"
+    fails = f"## Gate fails (fails if R<0)\n\n{columns}{robustness}"
+    passes = f"## Gate passes (fails if change > 0.1 at FM1)\n\n{columns}{change}"
+    gates = {"R<0": fails, "change > 0.1 at FM1": passes}
+    for texts in (["R<0", "change > 0.1 at FM1"], ["change > 0.1 at FM1", "R<0"]):
+        line = ["study", "compare", "old", "new"]
+        line += [word for text in texts for word in ("--fail-if", text)]
+        assert app.run(line) == 1
+        assert capsys.readouterr().out == "".join(gates[text] for text in texts)
+    equal = [
+        f"| old: change, {condition} (Fault tolerance and robustness) | 0.000 | "
+        "untestable: equal P |"
+        for condition in ("no fault", "removed, m = 1", "FM1, m = 1")
+    ]
+    assert command("study compare old old") == (
+        "\n".join([f"## Change of P\n\n{columns}{equal[0]}", *equal[1:], "", ""])
+    )
 
 
 def test_seeds_needed_are_told_of_a_stored_study(command: Command) -> None:

@@ -55,6 +55,18 @@ def test_every_text_is_written_in_every_encoding(text: str, encoding: str) -> No
         assert shown[: len(text)] == text
 
 
+def test_signs_that_an_encoding_lacks_are_spelled() -> None:
+    written = io.BytesIO()
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(sys, "stdout", io.TextIOWrapper(written, "ascii"))
+        patched.setattr(sys, "stderr", io.TextIOWrapper(io.BytesIO(), "ascii"))
+        prepare_output()
+        sys.stdout.write("→ – — − … † ∞ × ≤ ≥ ± µ μ 5° ─ ━ ü \U0001f916\n")
+        sys.stdout.flush()
+        shown = written.getvalue().decode("ascii")
+    assert shown == r"-> - - - ... + inf x <= >= +/- u u 5 deg - - \xfc \U0001f916" + "\n"
+
+
 # The other charmaps are written as cp1252 is; the test above takes all of them.
 @pytest.mark.daily
 @pytest.mark.parametrize(

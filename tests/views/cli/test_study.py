@@ -13,17 +13,22 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from swarm_logistics_env.compiler.numba_fence import QUIET
+from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.policies import read_card
 from swarm_logistics_env.policies.catalogue import WEIGHTS
 from swarm_logistics_env.study.questions.presets import PRESETS
 from swarm_logistics_env.study.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.tasks.outcome import Outcome
 from swarm_logistics_env.views.cli import app, study_commands
 from tests.conftest import figures_drawn
+from tests.made_up import delivered
 from tests.views.cli.conftest import Command
 
 FILE = """
@@ -179,6 +184,11 @@ def test_ctrl_c_stops_and_says_how_to_go_on(file: Path) -> None:
         ("--seeds 3", "warehouse", "mine", 6, ""),
         ("--seeds 3 --clearing", "clearing", "mine-clearing", 6, ""),
         ("--until-clear", "warehouse", "mine", 400, ", and with what later looks need"),
+        ("--seeds 3 --shard 2/3", "warehouse", "mine/shard-2-of-3", 2, ""),
+        (
+            "--seeds 3 --restock --performance on_time --set order_due=9 --policy homing",
+            *("warehouse", "mine-restock-on-time-order-due-9-homing", 6, ""),
+        ),
     ],
 )
 def test_what_is_left_of_a_study_that_is_stopped_is_told(
@@ -209,6 +219,67 @@ def test_a_pilot_is_played_of_tasks_with_items_alone(monkeypatch: pytest.MonkeyP
     )
     monkeypatch.delattr(study_commands, "Run")
     study_commands.say_what_a_pilot_shows(study)
+
+
+OUTCOMES: dict[str, tuple[Outcome, bool, str]] = {
+    "": (delivered(3), False, ""),
+    "nothing": (
+        delivered(0),
+        False,
+        "delivers nothing in a first run. Ctrl-C stops; finished runs are kept.",
+    ),
+    "all": (
+        delivered(3),
+        True,
+        (
+            "delivers every item before the end, so that P is capped and most verdicts will be "
+            "open. Nothing is capped where items come back, or where P is the rate until all are "
+            "delivered: add --restock or --clearing"
+        ),
+    ),
+    "the most": (
+        delivered(3),
+        True,
+        "has the largest P possible in a first run: most verdicts will be open.",
+    ),
+    "an error": (
+        Outcome(error="Traceback\nValueError: \x07 a\n"),
+        False,
+        r"fails in a first run: ValueError: \x07 a. Ctrl-C stops; finished runs are kept.",
+    ),
+    "a shape": (
+        Outcome(error="Traceback\nPolicyError: A: commands of shape (2, 3)\n"),
+        False,
+        "fails in a first run: A: commands of shape (2, 3)",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", OUTCOMES)
+def test_what_a_first_run_shows_of_a_policy_is_told(
+    what: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    outcome, has_cap, sentence = OUTCOMES[what]
+    study = Study.from_file(
+        "mine.toml",
+        first_seed=7,
+        performance="longest_standstill:60" if what == "the most" else None,
+    )
+    runs: list[tuple[int, int]] = []
+
+    def run(case: Any, _: str, seed: int) -> Any:
+        runs.append((case.scenario.n_robots, seed))
+        return SimpleNamespace(play=lambda: outcome)
+
+    monkeypatch.setattr(study_commands, "Run", run)
+    monkeypatch.setattr(study_commands, "is_capped", lambda *_: has_cap)
+    if what == "a shape":
+        with pytest.raises(StudyError, match=f"^swarm-dt {re.escape(sentence)}$"):
+            study_commands.say_what_a_pilot_shows(study)
+    else:
+        study_commands.say_what_a_pilot_shows(study)
+        assert capsys.readouterr().out == (f"swarm-dt {sentence}\n" if sentence else "")
+    assert runs == [(4, 7)]  # in the base scenario alone
 
 
 def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says_so(

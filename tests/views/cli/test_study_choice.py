@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.core.errors import BodiesError, StudyError
 from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.tasks.task import task_of
 from swarm_logistics_env.views.cli.study_choice import (
     ask_in_world,
     change_scenario,
+    changes_in_words,
     switch_to_clearing,
 )
 
@@ -49,6 +53,40 @@ def test_values_of_a_parameter_follow_from_its_value_there() -> None:
     assert after["delivery_width"] == (1.0, 0.5)
     ask_in_world(study, Scenario(floor="aisles"))
     assert study.specification.parameters == ()
+
+
+@pytest.mark.parametrize(
+    ("n_robots", "width", "sizes"),
+    [(25, 2.0, [(10, 25)]), (4, 1.0, [(2, 4)]), (1, 0.7, [])],
+)
+def test_swarms_that_do_not_fit_are_not_asked_about(
+    n_robots: int, width: float, sizes: list[tuple[int, ...]]
+) -> None:
+    study = Study.preset("scorecard")
+    ask_in_world(
+        study,
+        Scenario(
+            n_robots=n_robots, n_items=1, warehouse_width=width, warehouse_height=width,
+            delivery_width=0.4, restock=True,
+        ),
+    )  # fmt: skip
+    assert [factor.values for factor in study.specification.sizes] == sizes
+
+
+def test_a_study_of_clearing_has_no_items_that_come_back_and_no_published_values() -> None:
+    study = Study.preset("paper")
+    assert study.specification.reference is not None
+    change_scenario(study, {"n_robots": 7})
+    switch_to_clearing(study)
+    specification = study.specification
+    assert (specification.task, specification.reference) == ("clearing", None)
+    default: Any = task_of("clearing").default
+    assert specification.scenario == Scenario(n_robots=7, restock=False, duration=default.duration)
+
+
+def test_what_changed_names_a_directory_in_short() -> None:
+    fields = {"n_robots": 7, "floor": "a" * 60, "max_speed": 0.5}
+    assert changes_in_words(fields) == ["n-robots-7", f"floor-{'a' * 34}", "max-speed-0-5"]
 
 
 def test_a_floor_plan_takes_the_questions_of_sizes_out_of_a_study_and_says_so(

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import base64
+import math
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ from swarm_logistics_env.world.rendering.renderer import Renderer, load_pygame
 
 load_pygame()
 
+from swarm_logistics_env.views.watch import embedded  # noqa: E402
 from swarm_logistics_env.views.watch.embedded import film  # noqa: E402
 from swarm_logistics_env.views.watch.film import Film, Take  # noqa: E402 - wants pygame
 
@@ -28,11 +31,27 @@ def test_runs_go_on_one_clock_until_the_end() -> None:
     faults = [Fault("FM4", 2, onset=5.0)]
     takes = [take(), take(*faults)]
     film = Film(takes, until=1e9, speed=3.0, frame_rate=7.0, size=100)
-    assert len(list(film.frames())) == film.n_frames == 28 + 1 + 14
+    times = [[take.play.world.state.time for take in takes] for _ in film.frames()]
+    assert len(times) == film.n_frames == 28 + 1 + 14
+    for number, (time, time_beside) in enumerate(times):
+        assert time == time_beside
+        assert -1e-6 < time - min(number * 3.0 / 7.0, 12.0) < SMALL.control_period - 1e-6
     for film_take, faults_of_take in zip(takes, ([], faults)):
         episode = run_episode(SMALL, policies.load("swarm-dt"), 3, faults_of_take)
         assert film_take.play.is_over
         assert film_take.play.world.state.delivery_times == episode.delivery_times.tolist()
+
+
+def test_a_film_goes_on_until_the_last_run_is_over_and_then_stays_two_seconds() -> None:
+    short, served = SMALL.replace(duration=2.0), SMALL.replace(n_robots=1, n_items=1)
+    runs = [Play(scenario, policies.load("homing"), 4) for scenario in (short, served)]
+    film = Film([Take("a", run) for run in runs], 90.0, 0.8, 4.0, 100)
+    times = [runs[1].world.state.time for _ in film.frames()]
+    assert [run.is_over for run in runs] == [True, True]
+    delivered_at = runs[1].world.state.time
+    assert delivered_at == pytest.approx(2.3)
+    assert times.count(delivered_at) == 1 + 8
+    assert len(times) == 1 + math.ceil(2.3 / 0.2) + 8 < film.n_frames == 1 + 60 + 8
 
 
 def test_same_runs_give_the_same_frames_and_faults_show() -> None:
@@ -48,10 +67,22 @@ def test_same_runs_give_the_same_frames_and_faults_show() -> None:
     picture = Renderer(SMALL, "rgb_array", 120).frame(at_start.state, SMALL)
     head = len(sound[0]) - len(picture)
     np.testing.assert_equal(sound[0][head:], picture)
-    assert 20 < head < 40
+    assert head == 32
     # Side by side each looks as it does alone.
     wide = frames(take(), take(fault))
     np.testing.assert_equal([np.hstack(pair) for pair in zip(sound, broken)], wide)
+
+
+def test_the_name_stands_left_above_a_picture_and_does_not_reach_the_count_right() -> None:
+    runs = [Take(name, take().play) for name in (" ", "i", "i" * 400)]
+    heads = [next(Film([run], 3.0, 10.0, 10.0, 660).frames())[:48] for run in runs]
+    inked = [np.argwhere((head != head[0, 0]).any(axis=2)) for head in heads]
+    ends = [[*places.min(axis=0), *places.max(axis=0)] for places in inked]
+    for end, left in zip(ends, (635, 10, 11)):
+        assert end == pytest.approx([12, left, 33, 649], abs=1)
+    count = [head[:, 600:] for head in heads]
+    np.testing.assert_equal(count[1], count[0])
+    assert (inked[2][inked[2][:, 1] < 600].max(axis=0) > [20, 590]).all()
 
 
 def test_runs_in_wide_warehouses_stand_one_above_the_other() -> None:
@@ -91,12 +122,64 @@ def test_a_film_in_a_notebook_is_a_video_that_can_be_kept(tmp_path: Path) -> Non
         short.save(tmp_path / "nowhere" / "film.mp4")
 
 
+@pytest.mark.parametrize(
+    ("fields", "until", "speed", "seed", "floor"),
+    [
+        ({}, 60.0, 4.0, 0, None),
+        (
+            {"until": 7.0, "speed": 3.0, "seed": 5, "scenario": Scenario(floor="aisles")},
+            *(7.0, 3.0, 5, "aisles"),
+        ),
+    ],
+)
+def test_a_film_in_a_notebook_shows_what_its_arguments_say(
+    fields: dict[str, Any],
+    until: float,
+    speed: float,
+    seed: int,
+    floor: str | None,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    films: list[Any] = []
+
+    def write_film(path: Path, frames: object, frame_rate: float, *, has_plan: bool) -> None:
+        assert frames == "frames"
+        path.write_bytes(b"x" * 260_000)
+        films.append((frame_rate, has_plan))
+
+    def new_film(takes: list[Take], *arguments: float) -> Any:
+        by_name, by_object = takes
+        assert (by_name.name, by_object.name) == ("homing", "icyWithAVeryLongNameOfIt")
+        for film_take in takes:
+            assert film_take.play.world.scenario == fields.get("scenario", Scenario())
+            assert film_take.play.world.faults == (Fault("FM1", 1),)
+        films.append(arguments)
+        return SimpleNamespace(frames=lambda: "frames")
+
+    monkeypatch.setattr(embedded, "write_film", write_film)
+    monkeypatch.setattr("swarm_logistics_env.views.watch.film.Film", new_film)
+    long_name = type("APoicyWithAVeryLongNameOfIt", (type(policies.load("homing")),), {})
+    shown = film("homing", long_name(), faults=["FM1:1"], **fields)
+    assert films == [(until, speed, 25.0), (25.0, floor is not None)]
+    title = f"homing, icyWithAVeryLongNameOfIt, seed {seed}"
+    assert repr(shown) == f"EmbeddedFilm('{title}', 0.3 MB)"
+    assert shown.content == b"x" * 260_000
+
+
 def test_wrong_arguments() -> None:
     right: dict[str, Any] = {"takes": [take()], "until": 5.0, "speed": 1.0, "frame_rate": 9.0}
     for name, wrong, words in (
-        ("takes", [], "0 runs: should be 1 to 4"),
-        ("until", float("nan"), "until = nan"),
-        ("speed", 0.0, "speed = 0"),
+        ("takes", [], "0 runs: should be 1 to 4 side by side"),
+        ("takes", [take()] * 5, "5 runs: should be 1 to 4 side by side"),
+        ("until", float("nan"), "until = nan s: should be above 0"),
+        ("until", float("inf"), "until = inf s: should be above 0"),
+        ("until", 0.0, "until = 0 s: should be above 0"),
+        ("speed", 0.009, "speed = 0.009: should be 0.01 to 1000 times real time"),
+        ("speed", 1001.0, "speed = 1001: should be 0.01 to 1000 times real time"),
     ):
-        with pytest.raises(SetupError, match=words):
+        with pytest.raises(SetupError, match=f"^{words}$"):
             Film(**{**right, name: wrong})
+    for name, bound in (("takes", [take()] * 4), ("speed", 0.01), ("speed", 1000.0)):
+        assert Film(**{**right, name: bound}).n_frames > 18
+    (height, width, _) = next(Film(**right).frames()).shape
+    assert (height, width) == (740, 600)  # of the size that is not given

@@ -24,9 +24,11 @@ def test_a_recording_begins_anew_with_each_episode() -> None:
     recording = Recording(session)
     for _ in range(2):
         recording.note()
-        for _ in range(20):
+        for _ in range(23):
             session.advance()
             recording.note()
+        times = [frame["time"] for frame in frames_of(recording)]
+        assert times == [0.0, 0.5, 1.0, 1.5, 2.0]
         session.next_seed()
     recording.note()
     (packed,) = re.findall(r'id="recording">([^<]+)<', recording.page())

@@ -7,7 +7,7 @@ import math
 import random
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -96,6 +96,43 @@ class Flat(Exact):
         return super().move(orders)._replace(position=np.zeros(len(orders.laden)))
 
 
+class Misshapen(Exact):
+    """Returns something of a wrong shape."""
+
+    wrong: ClassVar[dict[str, Any]] = {}
+
+    def move(self, orders: Orders) -> Poses:
+        """Return one wrong shape."""
+        return super().move(orders)._replace(**self.wrong)
+
+
+class Stays:
+    """Cannot move."""
+
+    def place(self, placement: Placement) -> None: ...
+
+
+class Unmade(Exact):
+    """Cannot be made."""
+
+    def __init__(self) -> None:
+        raise OSError("no camera")
+
+
+class Notes(Exact):
+    """Does what is wanted, and keeps what it was told."""
+
+    def place(self, placement: Placement) -> None:
+        """Begin at rest."""
+        self.placement, self.orders = placement, list[Orders]()
+        super().place(placement)
+
+    def move(self, orders: Orders) -> Poses:
+        """Move as wanted."""
+        self.orders.append(orders)
+        return super().move(orders)
+
+
 class Vague(Exact):
     """Does not know where robot 1 is, and does not say so."""
 
@@ -121,6 +158,38 @@ def test_a_robot_drives_as_its_bodies_do_and_carries_its_item_along() -> None:
     assert displacement == pytest.approx(step * np.array([np.cos(heading), np.sin(heading)]))
     episode = run_episode(world.scenario, load("homing"), seed=2)
     assert episode.delivered > 0
+
+
+def test_bodies_are_told_where_everything_is_and_what_robots_want() -> None:
+    fields: dict[str, Any] = {"n_obstacles": 1, "pickup_range": 20.0, "floor": "A=:/A.:/A::"}
+    fields |= {"cell_size": 2.0, "heading_drift": 0.1, "ranger_range": 1.0}
+    world: Any = Warehouse(scenario("Notes", **fields))
+    world.reset(7, ["dead:1"])
+    state, bodies = world.state, world._elsewhere._bodies
+    placement, orders = bodies.placement, bodies.orders
+    dead = world.struck_robots[0]
+    assert (placement.scenario, placement.seed) == (world.scenario, 7)
+    np.testing.assert_array_equal(placement.position, state.robot_position)
+    np.testing.assert_array_equal(placement.heading, state.robot_heading)
+    np.testing.assert_array_equal(placement.obstacles, state.obstacle_position)
+    assert placement.boxes.tolist() == [[2.0, 4.0, 4.0, 6.0]]
+    before = state.robot_heading.copy()
+    for _ in range(12):  # more than half a turn
+        world.step(np.tile([0.3, 0.0, 0.5, 1.0], (3, 1)))
+    drives = np.arange(3) != dead
+    wanted = np.array([0.6, 0.0, 3.0])  # of 2 m/s and 6 rad/s
+    for order in orders:
+        drift = np.outer(state.robot_heading_drift, [0.0, 0.0, 1.0])
+        np.testing.assert_allclose(order.motion, (wanted + drift) * drives[:, None], atol=1e-12)
+        assert order.present.tolist() == [True] * 3
+    assert [order.laden.tolist() for order in orders[:3]] == [[False] * 3, *[drives.tolist()] * 2]
+    np.testing.assert_allclose(np.hypot(*state.robot_velocity.T), 0.6 * drives)
+    turned = np.remainder(state.robot_heading - before + np.pi, 2.0 * np.pi) - np.pi
+    expected = 1.2 * (3.0 + state.robot_heading_drift) * drives
+    np.testing.assert_allclose(np.cos(turned - expected), 1.0)
+    np.testing.assert_allclose(state.robot_turn_rate[drives], 3.0)
+    np.testing.assert_allclose(state.robot_position, bodies.position)
+    assert (np.abs(state.robot_heading) <= np.pi).all()
 
 
 def test_nobody_leaves_the_warehouse_whatever_the_bodies_say() -> None:
@@ -166,12 +235,23 @@ def test_a_lost_robot_leaves_the_arena_and_its_item_stays() -> None:
     ("name", "message"),
     [
         ("Flat", r"position of shape \(3,\): should be \(3, 2\)"),
-        ("Vague", r"of robot 1: should be finite, or the robot be lost"),
+        (
+            "Vague",
+            r"^bodies: pose \[.*, nan, .*\] of robot 1: should be finite, or the robot be lost$",
+        ),
+        ({"heading": np.zeros((3, 1))}, r"heading of shape \(3, 1\): should be \(3,\)$"),
+        ({"velocity": np.zeros((2, 3))}, r"velocity of shape \(2, 3\): should be \(3, 2\)$"),
+        ({"lost": [False]}, r"lost of shape \(1,\): should be \(3,\)$"),
+        (
+            {"velocity": np.full((3, 2), np.inf)},
+            r"inf\] of robot 0: should be finite, or the robot ",
+        ),
     ],
 )
-def test_poses_that_cannot_be_are_refused(name: str, message: str) -> None:
-    world = Warehouse(scenario(name))
+def test_poses_that_cannot_be_are_refused(name: str | dict[str, Any], message: str) -> None:
+    world: Any = Warehouse(scenario(name if isinstance(name, str) else "Misshapen"))
     world.reset(seed=0)
+    world._elsewhere._bodies.wrong = name
     with pytest.raises(BodiesError, match=message):
         world.step(np.zeros((3, 4)))
 
@@ -182,7 +262,9 @@ def test_poses_that_cannot_be_are_refused(name: str, message: str) -> None:
         ("mujoko", "no bodies 'mujoko'.*did you mean 'mujoco'"),
         (f"{__name__}:Exakt", "has no Exakt; did you mean 'Exact'"),
         ("no_such_module:Bodies", "cannot be imported"),
-        (f"{__name__}:Path", "have no method place"),
+        (f"{__name__}:Path", r"Path' have no method place: should be as `Bodies`$"),
+        (f"{__name__}:Stays", r"Stays' have no method move: should be as `Bodies`$"),
+        (f"{__name__}:Unmade", r"Unmade' cannot be made: OSError: no camera$"),
     ],
 )
 def test_bodies_that_there_are_not_are_named(name: str, message: str) -> None:

@@ -15,7 +15,13 @@ from hypothesis import strategies as st
 from swarm_logistics_env import Scenario, Warehouse
 from swarm_logistics_env.core.errors import ScenarioError
 from swarm_logistics_env.world.floor import plan_names
-from swarm_logistics_env.world.floor.floor_plan import DOCK, RACK, STORAGE, merged_boxes
+from swarm_logistics_env.world.floor.floor_plan import (
+    DOCK,
+    RACK,
+    STORAGE,
+    floor_title,
+    merged_boxes,
+)
 
 SMALL = {"n_items": 2, "n_robots": 2}
 
@@ -31,10 +37,24 @@ def test_the_first_line_is_the_side_of_the_highest_y() -> None:
     assert (plan.width, plan.height) == (2.0, 1.5)
 
 
+def test_a_plan_says_of_each_cell_what_it_is_whose_dock_and_whether_robots_start_there() -> None:
+    plan = planned("B:.#.\nA::##\nA.:.=").plan
+    assert plan is not None
+    assert plan.dock_names == ("A", "B")
+    assert plan.dock.tolist() == [[0, -1, -1, -1, -1], [0, -1, -1, -1, -1], [1, -1, -1, -1, -1]]
+    starts = [[0, 1, 1, 1, 0], [0, 1, 1, 0, 0], [0, 1, 1, 0, 0]]  # a way leads to them
+    assert plan.start_cells.astype(int).tolist() == starts
+    assert plan.start_area == pytest.approx(7 * 0.25)
+    with_start = planned("A::\nA.+").plan
+    assert with_start is not None
+    assert with_start.start_cells.astype(int).tolist() == [[0, 0, 1], [0, 0, 0]]
+
+
 @pytest.mark.parametrize("name", plan_names())
 def test_a_shipped_plan_keeps_its_name_and_gives_the_sizes(name: str) -> None:
     scenario = Scenario(floor=name)
     assert scenario.floor == name
+    assert plan_names() == sorted(plan_names())
     sizes = {"large": (40.0, 20.0), "day": (16.0, 10.0)}
     size = (scenario.warehouse_width, scenario.warehouse_height)
     assert size == sizes.get(name, (10.0, 10.0))
@@ -54,6 +74,7 @@ def test_sizes_follow_from_the_plan_and_are_refused_otherwise() -> None:
     scenario = Scenario(warehouse_width=20.0).replace(floor="aisles")
     assert scenario.warehouse_width == 10.0
     assert scenario.replace(cell_size=1.0).warehouse_width == 20.0
+    assert planned("A:::", cell_size=1).warehouse_width == 4.0
     assert scenario.replace(floor=None).floor is None
     for fields in ({"warehouse_width": 12.0}, {"delivery_width": 1.0}):
         with pytest.raises(ScenarioError, match="should be left out, as the plan makes it"):
@@ -74,8 +95,14 @@ def test_sizes_follow_from_the_plan_and_are_refused_otherwise() -> None:
         ("A::#:\n:::#.", "line 1, column 5: no way leads from this storage to a dock"),
         ("A::#B\n:::#.", "line 1, column 5: no way leads from this dock to storage"),
         ("A::#+\n:::#.", "line 1, column 5: no way leads from this start to a dock"),
+        ("A=:\nA=:", "line 1, column 1: no way leads from this dock to storage"),
+        ("A#::\n::.:", "line 1, column 1: the way from this dock to storage is narrower than a"),
+        ("A:#A:\nA:###", "line 1, column 4: the way from this dock to storage is narrower than a"),
+        ("A:::", "line 1, column 1: the way from this dock to storage is narrower than a robot"),
+        ("A\n:\n:\n:", "line 1, column 1: the way from this dock to storage is narrower than a"),
         ("A:#:\nA:.:", "line 1, column 4: the way from this storage to a dock is narrower than a"),
         ("\n".join([":" * 1025] * 2), "a plan of 1025 x 2 cells: should be at most 1024 x 1024"),
+        ("\n".join(["A:"] * 1025), "a plan of 2 x 1025 cells: should be at most 1024 x 1024"),
         ("A:\t:\nA:::", "line 1, column 3: '\\t' is no cell"),
         ("A:a:\nA:::", "line 1, column 3: 'a' is no cell"),
         ("####\n####", "the plan has no dock (a letter from A to Z)"),
@@ -94,8 +121,18 @@ def test_an_error_names_line_and_column(text: str, message: str) -> None:
 def test_cells_thinner_than_a_robot_are_refused() -> None:
     with pytest.raises(ScenarioError, match="should be at least a robot's radius"):
         Scenario(floor="aisles", cell_size=0.1)
+    rows = "A:::::/A:::::"  # as wide as a robot
+    ways = planned(rows, cell_size=0.125, n_robots=1, n_items=1).plan
+    assert ways is not None
+    assert ways.reachable.all()
+    ways = planned("A:::/A:::/A:::", cell_size=0.2, n_robots=1, n_items=1).plan
+    assert ways is not None
+    assert ways.reachable.all()
     with pytest.raises(ScenarioError, match=r"Scenario.cell_size = 'wide': should be a number"):
         planned("aisles", cell_size="wide")
+    for field in ("cell_size", "robot_radius"):
+        with pytest.raises(ScenarioError, match=rf"Scenario.{field} = 0: should be at least 1e-09"):
+            planned("aisles", **{field: 0})
 
 
 @pytest.mark.parametrize(
@@ -164,6 +201,7 @@ def test_maps_of_benchmarks_run_unedited(tmp_path: Path) -> None:
         MOVING_AI.encode("utf-16"),
         codecs.BOM_UTF16_BE + MOVING_AI.encode("utf-16-be"),
         MOVING_AI.replace(".@@...@", "G@@..S@").encode(),
+        MOVING_AI.replace(".@@...@", "E@@..E@").encode(),  # goods, and no work stations
     ],
 )
 def test_maps_are_read_as_they_are_found(tmp_path: Path, content: bytes) -> None:
@@ -192,11 +230,31 @@ def test_a_sign_that_no_map_has_is_refused_by_line_and_column(sign: str) -> None
         ("type octile\nheight 4\nwidth 8\n", 'has no line "map"'),
         (MOVING_AI.partition("@")[0], "head says 4 rows, it has 0"),
         (MOVING_AI.replace(".", "@"), "the map has no free cell"),
+        # Where a map is as narrow as the dock, that is all of it.
+        ("type octile\nheight 2\nwidth 4\nmap\n....\n....", 'the plan has no storage (":")'),
+        ("type octile\nheight 2\nwidth 3\nmap\n...\n...", 'the plan has no storage (":")'),
     ],
 )
 def test_a_map_that_is_none_is_refused_by_line(text: str, message: str) -> None:
     with pytest.raises(ScenarioError, match=re.escape(message)):
         planned(text)
+
+
+def test_of_several_parts_of_a_map_the_largest_is_the_warehouse() -> None:
+    rows = "..@.....@.\n..@.....@."
+    map_text = f"type octile\nheight 2\nwidth 10\nmap\n{rows}"
+    assert planned(map_text).floor == "..#:AAAA#./..#:AAAA#."
+
+
+@pytest.mark.parametrize(
+    ("floor", "title"),
+    [
+        ("aisles", "aisles"), ("A:::/A.::", "plan of 4 x 2 cells"), ("A:", "plan of 2 x 1 cells"),
+        ("A::\nA::\nA::\n", "plan of 3 x 3 cells"), ("my/halls/north.txt", "my/halls/north.txt"),
+    ],
+)  # fmt: skip
+def test_a_table_names_a_floor_by_its_name_or_its_size(floor: str, title: str) -> None:
+    assert floor_title(floor) == title
 
 
 def test_the_largest_maps_of_cities_are_read() -> None:

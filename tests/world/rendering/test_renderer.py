@@ -313,6 +313,10 @@ def test_link_of_the_carrier() -> None:
     assert count(arena(state, scenario), palette.LINK) == 0
     give(state, 0, 0)
     assert count(arena(state, scenario), palette.LINK) > 100
+    for gap, has_room in ((0.7, True), (0.5, False), (0.4, False)):
+        state.robot_position[2] = [2.0 + gap, 2.0]
+        assert (count(arena(state, scenario), palette.LINK) > 0) == has_room
+    state.robot_position[2] = [5.0, 2.0]
     state.hears[0] = False
     assert count(arena(state, scenario), palette.LINK) == 0
 

@@ -61,10 +61,20 @@ def test_each_robot_has_its_turn_and_faults_do_not_move_where_things_start() -> 
         ({"robots": 0}, "Fault.robots = 0: "),
         ({"robots": (2, 0, 2)}, r"\(2, 0, 2\): should name each robot once"),
         ({"role": "carier"}, "Fault.role = 'carier': should be 'carrier', "),
-        ({"role": "carrier", "robots": (1,)}, "should be a number"),
+        (
+            {"role": "carrier", "robots": (1,)},
+            r"^Fault: role = 'carrier': .* a number, not \(1,\)$",
+        ),
+        (
+            {"role": "carrier", "kind": "a"},
+            "role = 'carrier' and kind = 'a': should be one of them",
+        ),
         ({"onset": float("nan")}, "Fault.onset = nan: "),
         ({"duration": 0.0}, "Fault.duration = 0.0: "),
-        ({"factor": 0.5}, "FM1 takes no factor"),
+        (
+            {"factor": 0.5},
+            "FM1 takes no factor; modes that do: motor_slow, motor_wear, cell_fades, view_reduced$",
+        ),
         ({"mode": "motor_slow", "factor": 1.0}, "Fault.factor = 1.0: "),
         ({"mode": "removed", "duration": 5.0}, "duration should be None"),
         ({"mode": "removed", "intermittent": (5, 5)}, "intermittent should be None"),
@@ -250,6 +260,44 @@ def test_robots_keep_their_speeds_and_senses_when_another_is_removed(build: Buil
     steps(world, STAY, STAY, STAY, times=5)
     assert state.failure_modes == (("removed",), ("FM2",), ())
     assert [array[1:].tolist() for array in (state.max_speed, state.view_range)] == before
+
+
+@pytest.mark.parametrize(
+    ("mode", "part", "left"),
+    [("motor_wear", "speed", 0.2), ("cell_fades", "battery", 0.2), ("motor_slow", "speed", 0.2)],
+)
+def test_what_wears_falls_evenly_from_the_onset_to_the_end_and_what_is_slow_is_so_at_once(
+    mode: str, part: str, left: float
+) -> None:
+    fault = Fault(mode, (0,), onset=100.0, factor=left)
+    occurrence = Occurrence(fault, 0, Scenario(n_robots=1, battery=5000.0))
+    factors = [occurrence.remaining_factors(time, 500.0) for time in (100.0, 300.0, 500.0, 600.0)]
+    expected = [left] * 4 if mode == "motor_slow" else [1.0, 0.6, left, left]
+    assert [factor.pop(part) for factor in factors] == pytest.approx(expected)
+    assert {value for factor in factors for value in factor.values()} == {1.0}
+    assert occurrence.next_change(99.9, 100.0) == 100.0
+    next_change = occurrence.next_change(200.0, 200.1)
+    assert next_change == (math.inf if mode == "motor_slow" else 200.1)
+
+
+def test_faults_are_numbered_once_their_robots_are_chosen() -> None:
+    world = Warehouse(SMALL)
+    faults = [Fault("dead", 2, onset=0.5, role="searching"), Fault("FM1", 3), Fault("FM2", (6,))]
+    world.reset(5, faults)
+    chosen = tuple(failed_robots(faults[1], 5, SMALL).tolist())
+    assert world.numbered_faults == (faults[0], Fault("FM1", chosen), faults[2])
+    assert world.struck_robots == tuple(sorted({*chosen, 6}))
+    steps(world, *[STAY] * 8, times=5)
+    struck = tuple(
+        np.flatnonzero(["dead" in modes for modes in world.state.failure_modes]).tolist()
+    )
+    assert len(struck) == 2
+    numbered = world.numbered_faults
+    assert numbered == (Fault("dead", struck, onset=0.5), Fault("FM1", chosen), faults[2])
+    before = world.state.failure_modes
+    world.set_faults(numbered)
+    assert world.state.failure_modes == before
+    assert world.faults == numbered
 
 
 def test_an_intermittent_fault_ends_with_its_duration_whatever_holds_then() -> None:
