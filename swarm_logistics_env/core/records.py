@@ -299,8 +299,8 @@ def canonical_json(value: object) -> str:
     return json.dumps(value, sort_keys=True, separators=(",", ":"))
 
 
-# By pydantic's names of problems; numbers are its limits.
 _TYPES = ("bool", "float", "int", "str")
+# By pydantic's names of problems; numbers are its limits.
 _PLAIN_WORDS = {
     "tuple_type": "should be a list",
     "model_type": "should be a table of fields",
