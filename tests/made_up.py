@@ -103,6 +103,27 @@ def paper(
 MEANS = {"FM2": 38.5, "FM3": 32.5, "FM4": 15.0}  # of 40 items
 
 
+# P of a run at each of four seeds.
+P_BY_SEED = {"homing": [6, 7, 9, 11], "swarm-dt": [8, 11, 12, 10], "random-walk": [1, 2, 1, 3]}
+
+
+def limited() -> StudyResults:
+    """A study with a failed run under FM4, where under FM1 every item is delivered once."""
+    faults = [{"modes": ["FM1", "FM4"], "robots": [1]}]
+    study = Study(
+        policies=["homing"], seeds=4, scenario={"n_robots": 4}, faults=faults, indicators=["R"]
+    )
+
+    def play(_: str, setting: Setting, seed: int) -> Outcome:
+        if (setting.name, seed) == ("FM4", 1):
+            return Outcome(error="Traceback")
+        is_full = (setting.name, seed) == ("FM1", 0)
+        count = 40 + seed**2 % 5 + 3 * (setting.name == "FM1")
+        return delivered(count, digest=f"{setting} {seed}", all_delivered=is_full)
+
+    return judged(study, play)
+
+
 def looked_at(modes: Iterable[str] = MEANS) -> StudyResults:
     """A study whose comparisons stop at looks of other levels than 95 %."""
     faults = [{"modes": [*modes], "robots": [1]}]

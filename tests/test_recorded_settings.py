@@ -6,6 +6,8 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
+from pydantic_core import to_jsonable_python
+
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, policies
 from swarm_logistics_env.policies.biased_walk import BiasedWalkParameters
 from swarm_logistics_env.policies.charging_robots import ChargingParameters
@@ -16,7 +18,7 @@ from swarm_logistics_env.policies.policy import ScriptParameters
 from swarm_logistics_env.policies.site_fidelity import SiteFidelityParameters
 from swarm_logistics_env.policies.swarm_dt import SwarmDTParameters
 from swarm_logistics_env.robots.middleware import Middleware
-from swarm_logistics_env.study.questions.benchmark_cells import drawn_cells
+from swarm_logistics_env.study.questions.benchmark_cells import SPACE, drawn_cells
 from swarm_logistics_env.study.questions.specification import (
     Ablation,
     Faults,
@@ -47,12 +49,17 @@ from tests.conftest import Check
 
 def settings() -> Iterator[tuple[str, object]]:
     """Yield what each setting is called, and its value as JSON can have it."""
+    for record in RECORDS:
+        defaults = {
+            name: to_jsonable_python(field.get_default(call_default_factory=True))
+            for name, field in record.model_fields.items()
+            if not field.is_required()
+        }
+        yield f"defaults of {record.__name__}", defaults
     usual = Scenario().model_dump(mode="json")
     for name, scenario in SCENARIO_PRESETS.items():
         fields = scenario.model_dump(mode="json")
-        changes = {field: value for field, value in fields.items() if value != usual.get(field)}
-        yield f"preset {name}", fields if name == "paper" else changes
-    yield "training", Training().model_dump(mode="json")
+        yield f"preset {name}", {x: fields[x] for x in fields if fields[x] != usual.get(x)}
     for name in preset_names():
         changes = load_training(name).model_dump(mode="json", exclude_defaults=True)
         yield f"training {name}", changes
@@ -70,6 +77,7 @@ def settings() -> Iterator[tuple[str, object]]:
         yield f"measure {name}", repr(measure)
     for cell in drawn_cells("development", "any text", 12):
         yield f"cell {cell.title}", cell.model_dump(mode="json", exclude_defaults=True)
+    yield "space of cells", SPACE
     yield "orders", ORDER_SHAPES
     yield "dark colours", palette.DARK_COLOURS
 

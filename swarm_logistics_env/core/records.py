@@ -191,13 +191,15 @@ class Record(BaseModel):
 
     @classmethod
     def _problem(cls, problem: dict[str, Any]) -> str:
-        # Parts such as "constrained-int" or "int" name a branch of a union, not a field.
+        # Parts such as "constrained-int", or "int" at the end, name a branch of a union.
         parts = [str(part) for part in problem["loc"]]
         if problem["type"] == "extra_forbidden" and len(parts) == 1:
             (unknown,) = parts
             return f"{cls.__name__} has no field {unknown!r}{suggest(unknown, cls.model_fields)}"
         names = [part for part in parts if part.isidentifier() or part.isdigit()]
-        name = ".".join(part for part in names if part not in _TYPES)
+        if parts and parts[-1] in _TYPES:
+            names.pop()
+        name = ".".join(names)
         field = f"{cls.__name__}.{name}" if name else cls.__name__
         message = _in_plain_words(problem)
         if message.startswith(f"{cls.__name__}"):

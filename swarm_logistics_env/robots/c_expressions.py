@@ -219,8 +219,10 @@ class Expressions(Operators):
         numbers = tuple(value.constant for value in indices)
         if None not in numbers:
             return Known(owner.value[numbers[0] if len(numbers) == 1 else numbers])
-        table = self._parts.table(owner.name, np.asarray(owner.value))
         lengths = owner.value.shape
+        if len(indices) < len(lengths):
+            raise NoCError(f"a row of {owner.name}")
+        table = self._parts.table(owner.name, np.asarray(owner.value))
         texts = [self._index(*which) for which in zip(indices, nodes, lengths, strict=True)]
         return Value(table + "".join(f"[{text}]" for text in texts), REAL)
 

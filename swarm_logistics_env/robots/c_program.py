@@ -45,7 +45,7 @@ class Program:
         self._tuples: set[TupleOf] = set()
         self._functions: dict[tuple[object, ...], Function] = {}
         self._names: set[str] = set()
-        self._alive: list[Sequence[Value | Known]] = []  # arguments: their ids are in keys
+        self._alive: list[tuple[Value | Known, ...]] = []  # arguments: their ids are in keys
 
     def function(self, function: Any, arguments: Sequence[Value | Known]) -> Function:
         """Return the function of C for a kernel and such arguments; it is written once.
@@ -77,7 +77,7 @@ class Program:
                 is_settled = len(wide) == n_wide
             self._note_tuples(written)
             self._functions[key] = written
-            self._alive.append(arguments)
+            self._alive.append(tuple(arguments))
         return self._functions[key]
 
     def _note_tuples(self, function: Function) -> None:

@@ -47,6 +47,18 @@ def imitate(training: Training, learner: Any, log: Any, rng: np.random.Generator
     log.cpu_seconds += time.process_time() - cpu
 
 
+def share_and_rate(settings: Teaching, number: int) -> tuple[float, float]:
+    """Return the share of robots that do what the teacher says in a round, and its learning rate.
+
+    Args:
+        number: of the round, from 0 on.
+    """
+    done = number / (ROUNDS - 1)
+    first, last = settings.shares
+    rate = settings.rate * (LATE_RATE if done > LATE else 1.0)
+    return first + done * (last - first), rate
+
+
 def _imitate(
     training: Training, settings: Teaching, learner: Any, rng: np.random.Generator
 ) -> None:
@@ -57,15 +69,12 @@ def _imitate(
     n_messages = N_MESSAGES if policy.talks else 0
     labels = np.empty((len(rows), len(OUTPUTS) + n_messages), np.float32)
     optimizer = torch.optim.Adam(policy.actor_parameters(), settings.rate)
-    first, last = settings.shares
     columns = learner.env.reset()
     with ProgressBar(f"{training.name}, imitation", len(rows), "decisions") as progress:
         for number in range(ROUNDS):
-            done = number / (ROUNDS - 1)
+            share, rate = share_and_rate(settings, number)
             new = slice(number * n_new, (number + 1) * n_new)
-            share = first + done * (last - first)
             columns = _collect(learner, columns, share, settings.noise, rng, rows[new], labels[new])
-            rate = settings.rate * (LATE_RATE if done > LATE else 1.0)
             for group in optimizer.param_groups:
                 group["lr"] = rate
             for _ in range(max(1, settings.epochs * n_new // BATCH)):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,38 +10,30 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.compiler.numba_fence import IS_INTERPRETED
 from swarm_logistics_env.compiler.packing import packed
+from tests.compiler.test_packing import Inner, Outer
 
 if IS_INTERPRETED:
     pytest.skip("nothing is compiled", allow_module_level=True)
 
+from numba import njit
+
 from swarm_logistics_env.compiler import compiled_addresses
 
 
-class Inner(NamedTuple):
-    share: float
-    is_on: bool
-    row: Annotated[NDArray[np.float64], 3]
+@njit
+def place_of(array: NDArray[Any]) -> tuple[Any, ...]:
+    return array.ctypes.data, array.shape, array.strides
 
 
-class Outer(NamedTuple):
-    total: int
-    rows: Annotated[NDArray[np.float32], "N", 3]
-    inner: Inner
-    flags: Annotated[NDArray[np.bool_], "N"]
-    last: float
+@njit
+def fields_at(address: int) -> tuple[Any, ...]:
+    outer = compiled_addresses.unpacked_at(Outer, address)
+    numbers = outer.total, outer.inner.share, outer.inner.is_on, outer.last
+    return numbers, place_of(outer.rows), place_of(outer.inner.row), place_of(outer.flags)
 
 
-def test_each_field_lies_behind_the_words_of_those_before_it() -> None:
-    places = compiled_addresses._places.__wrapped__(Outer)
-    assert {
-        name: (str(kind).rpartition(".")[2], before) for name, (kind, before) in places.items()
-    } == {
-        "total": ("int64", 0),
-        "rows": ("array(float32, 2d, C)", 1),
-        "inner": ("Inner at an address", 4),
-        "flags": ("array(bool, 1d, C)", 8),
-        "last": ("float64", 10),
-    }
-    inner = Inner(0.5, False, np.zeros(3))
-    outer = Outer(3, np.zeros((2, 3), np.float32), inner, np.zeros(2, np.bool_), 1.0)
-    assert len(packed(outer)) == 11 == compiled_addresses._n_words(Outer)
+def test_a_kernel_finds_each_field_behind_the_words_of_those_before_it() -> None:
+    rows, row, flags = np.zeros((2, 3), np.float32), np.zeros(3), np.zeros(2, np.bool_)
+    words = packed(Outer(-7, rows, Inner(0.25, True, row), flags, -1.5))
+    places = map(place_of.py_func, (rows, row, flags))
+    assert fields_at(words.ctypes.data) == ((-7, 0.25, True, -1.5), *places)

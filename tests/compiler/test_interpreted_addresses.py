@@ -3,70 +3,28 @@
 from __future__ import annotations
 
 import ctypes
-from typing import Annotated, Any, NamedTuple
+from typing import Any
 
 import numpy as np
-import pytest
-from numpy.typing import NDArray
 
 from swarm_logistics_env.compiler import interpreted_addresses as at
-from swarm_logistics_env.compiler.packing import blank, packed
-
-
-class Inner(NamedTuple):
-    share: float
-    is_on: bool
-
-
-class Outer(NamedTuple):
-    total: int
-    rows: Annotated[NDArray[np.float32], "N", 3]
-    inner: Inner
-    flags: Annotated[NDArray[np.bool_], "N"]
-    last: float
-
-
-class Arrays(NamedTuple):
-    rows: Annotated[NDArray[np.float32], "N", 3]
-    flags: Annotated[NDArray[np.bool_], "N"]
+from swarm_logistics_env.compiler.packing import packed
+from tests.compiler.test_packing import Inner, Outer
 
 
 def test_a_structure_is_read_from_its_words_and_shares_its_arrays() -> None:
     rows, flags = np.arange(6, dtype=np.float32).reshape(2, 3), np.array([True, False])
-    outer = Outer(-7, rows, Inner(0.25, True), flags, -1.5)
-    words = packed(outer)
-    assert len(words) == 1 + 3 + 2 + 2 + 1
-    assert words[[0, 2, 3, 5, 7]].tolist() == [-7, 2, 3, 1, 2]
-    read = at.unpacked_at(Outer, words.ctypes.data)
-    assert (read.total, read.inner, read.last) == (-7, Inner(0.25, True), -1.5)
-    assert type(read.inner.is_on) is bool
-    np.testing.assert_array_equal(read.rows, rows)
-    np.testing.assert_array_equal(read.flags, flags)
-    read.rows[1, 2] = 9.0
+    row = np.arange(3.0)
+    words = packed(Outer(-7, rows, Inner(0.25, True, row), flags, -1.5))
+    assert len(words) == 1 + 3 + (1 + 1 + 2) + 2 + 1
+    assert words[[0, 2, 3, 5, 7, 9]].tolist() == [-7, 2, 3, 1, 3, 2]
+    outer = at.unpacked_at(Outer, words.ctypes.data)
+    assert (outer.total, outer.inner.share, outer.inner.is_on, outer.last) == (-7, 0.25, True, -1.5)
+    assert type(outer.inner.is_on) is bool
+    for array, original in ((outer.rows, rows), (outer.inner.row, row), (outer.flags, flags)):
+        np.testing.assert_array_equal(array, original)
+    outer.rows[1, 2] = 9.0
     assert rows[1, 2] == 9.0
-
-
-def test_arrays_of_zeros_have_the_lengths_that_shapes_name() -> None:
-    arrays = blank(Arrays, {"N": 4})
-    assert [(part.shape, str(part.dtype)) for part in arrays] == [
-        ((4, 3), "float32"), ((4,), "bool")
-    ]  # fmt: skip
-    assert not any(part.any() for part in arrays)
-
-
-@pytest.mark.parametrize(
-    "rows",
-    [
-        np.zeros((2, 3)),
-        np.zeros(6, np.float32),
-        np.zeros((3, 2), np.float32).T,
-        np.zeros((2, 6), np.float32)[:, ::2],
-    ],
-)
-def test_an_array_that_compiled_code_would_misread_is_refused(rows: NDArray[Any]) -> None:
-    shape = r"\('N', 3\) numbers of float32, without gaps$"
-    with pytest.raises(TypeError, match=rf"^Arrays.rows: should be {shape}"):
-        packed(Arrays(rows, np.zeros(2, np.bool_)))
 
 
 def test_words_are_read_and_changed_by_their_index() -> None:

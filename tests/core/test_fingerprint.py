@@ -250,14 +250,3 @@ def test_the_code_version_is_that_of_what_decides_an_episode(
     before = package_code(*EPISODE_CODE)
     monkeypatch.setattr(Path, "read_text", read_changed)
     assert (package_code.__wrapped__(*EPISODE_CODE) != before) == counts
-
-
-def test_the_code_version_is_of_the_named_files_in_the_order_of_their_paths(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("swarm_logistics_env.core.fingerprint._hash", lambda *texts: texts)
-    names_and_texts = package_code.__wrapped__("train/teacher.py", "core/*.py", "!core/errors.py")
-    names = [path.relative_to(PACKAGE).as_posix() for path in PACKAGE.glob("core/*.py")]
-    names = sorted({*names, "train/teacher.py"} - {"core/errors.py"})
-    assert list(names_and_texts[::2]) == names
-    assert list(names_and_texts[1::2]) == [(PACKAGE / name).read_text("utf-8") for name in names]

@@ -11,6 +11,8 @@ typedef float real;
 #define STEP 0.25f
 #define COLUMN_FIRST 1
 #define COLUMN_SECOND 2
+#define LEAST (-0.5f)
+#define WIDE REAL(0.1)
 
 typedef struct {
     real at[2];
@@ -83,6 +85,21 @@ static const real TABLE[4] = {
     4.0f,
 };
 
+static const real ROWS[2][2] = {
+    {0.5f, REAL(0.1)},
+    {2.0f, 3.0f},
+};
+
+static const struct {
+    real speed;
+    real arms;
+    bool is_round;
+} body = {
+    .speed = REAL(0.1),
+    .arms = 2.0f,
+    .is_round = true,
+};
+
 static real whole_numbers(float x, int32_t n) {
     return (real)quotient_of(n, 3) + 10.0f * (real)remainder_of(n,
             3) + 100.0f * (real)whole_number(REAL(rint)(x)) + 1000.0f * (real)whole_number(x);
@@ -143,6 +160,16 @@ static real arrays(float x, int32_t n) {
     is_odd = is_odd || remainder_of(n, 2) == 1;
     real rest = largest_of(part, 2) + (float)place_of_smallest(part, 2) + (is_odd ? 1.0f : 0.0f);
     return (real)numbers[2] * 10.0f + rest;
+}
+
+/* Say what. */
+static real described(float x, int32_t n) {
+    /* First this. */
+    if (n > COLUMN_SECOND && body.is_round) {
+        return LEAST + STEP;
+    }
+    /* Then that. */
+    return ROWS[n][1] * swapped(x, 1.0f).at[0] - WIDE * body.speed;
 }
 
 static void stepping(float *numbers, int32_t n) {

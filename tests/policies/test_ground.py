@@ -96,8 +96,8 @@ def test_a_dock_of_a_plan_is_held_in_as_deep_as_asked_or_as_it_goes() -> None:
     for dock, cells in ((0, first), (1, second), (NOBODY, first | second)):
         np.testing.assert_array_equal(ground.dock_cells(dock), cells)
     np.testing.assert_array_equal(ground.holding_cells(0.0), first | second)
-    held = ground.holding_cells(0.3)
-    assert [held[row].nonzero()[0].tolist() for row in (0, 2, 9, 10, 15)] == [
+    deep_cells = ground.holding_cells(0.3)
+    assert [deep_cells[row].nonzero()[0].tolist() for row in (0, 2, 9, 10, 15)] == [
         [34, 35, 36, 37, 38, 39], [], [], [0, 1, 2], [0, 1, 2, 3, 4, 5]
     ]  # fmt: skip
     assert np.argwhere(ground.holding_cells(0.9)).tolist() == [
@@ -140,9 +140,9 @@ def test_places_to_rest_and_slots_of_a_plan_are_the_first_that_fit() -> None:
     assert slots[:, 1].min() >= 0.33
     assert slots[:, 1].max() <= 2.0 - 0.33
     assert [len(ground.resting_places(many)) for many in (14, 100)] == [14, 100]
-    crowded = ground.resting_places(25)  # more than have 0.6 m: two radii apart
-    apart = np.linalg.norm(crowded[:, None] - crowded, axis=2)[~np.eye(25, dtype=bool)]
-    assert 0.25 <= apart.min() < 0.3
+    places = ground.resting_places(25)  # more than have 0.6 m: two radii apart
+    distances = np.linalg.norm(places[:, None] - places, axis=2)[~np.eye(25, dtype=bool)]
+    assert 0.25 <= distances.min() < 0.3
 
 
 def test_discs_are_of_what_counts_and_as_wide_as_a_robot_must_stay_away() -> None:

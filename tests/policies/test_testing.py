@@ -31,7 +31,7 @@ class Forgetful(SwarmDT):
         super().reset(n_robots, seed + self.episodes)
 
 
-class Forgets(SwarmDT):
+class LosesSeedWhenCopied(SwarmDT):
     """A copy of it lacks what it was made with."""
 
     shift = 0
@@ -45,10 +45,10 @@ class Forgets(SwarmDT):
 
 class Counted(SwarmDT):
     n_acts = 0  # of any copy
-    played: Scenario
+    last_scenario: Scenario
 
     def configure(self, scenario: Scenario) -> None:
-        Counted.played = scenario
+        Counted.last_scenario = scenario
         super().configure(scenario)
 
     def act(self, observations: Any) -> Any:
@@ -162,16 +162,16 @@ def test_a_policy_that_is_not_reset_is_named() -> None:
     with pytest.raises(testing.CheckError, match=after):
         testing.check_policy(Forgetful(), SMALL, steps=60)
     with pytest.raises(testing.CheckError, match=f"{start} with a pickled copy of the policy: "):
-        testing.check_policy(Forgets(), SMALL, steps=5)
+        testing.check_policy(LosesSeedWhenCopied(), SMALL, steps=5)
 
 
 def test_as_many_steps_are_played_as_asked_for() -> None:
     Counted.n_acts = 0
     testing.check_policy(Counted(), SMALL, steps=7)
     assert Counted.n_acts == 4 * 7
-    assert Counted.played == SMALL
+    assert Counted.last_scenario == SMALL
     testing.check_policy(Counted(), steps=1)
-    assert Counted.played == Scenario()
+    assert Counted.last_scenario == Scenario()
     Counted.n_acts = 0
     testing.check_wrapper(lambda: parallel_env(SMALL), Counted(), steps=7)
     assert Counted.n_acts == 3 * 7

@@ -43,9 +43,9 @@ def sensed() -> np.ndarray:
     return rows
 
 
-def told_rows(world: Warehouse, **who: object) -> tuple[np.ndarray, list[int]]:
+def told_rows(world: Warehouse, **options: object) -> tuple[np.ndarray, list[int]]:
     """Return the rows of the script, and which robots have the requested item in them."""
-    policy = Told(**who)
+    policy = Told(**options)
     policy.configure(world.scenario)
     policy._script = script = Rows()  # type: ignore[assignment]
     policy.act(sensed(), world.state)
@@ -54,7 +54,7 @@ def told_rows(world: Warehouse, **who: object) -> tuple[np.ndarray, list[int]]:
 
 
 @pytest.mark.parametrize(
-    ("who", "robots"),
+    ("options", "robots"),
     [
         ({"hears": "hops", "count": 1}, [0, 1]),
         ({"hears": "hops", "count": 2}, [0, 1, 2]),
@@ -63,14 +63,14 @@ def told_rows(world: Warehouse, **who: object) -> tuple[np.ndarray, list[int]]:
     ],
 )
 def test_those_are_told_who_are_near_enough_and_carry_nothing(
-    who: dict[str, object], robots: list[int]
+    options: dict[str, object], robots: list[int]
 ) -> None:
     world = world_of([1.0, 2.9, 4.8, 6.7, 8.6, 9.5])  # the first has it in view
-    _, listeners = told_rows(world, **who)
+    _, listeners = told_rows(world, **options)
     assert listeners == robots
     world.state.robot_item[1] = 2
     world.state.item_status[2] = 1
-    _, listeners = told_rows(world, **who)
+    _, listeners = told_rows(world, **options)
     assert 1 not in listeners
     assert 0 in listeners
 
@@ -87,9 +87,9 @@ def test_the_true_place_stands_in_the_robots_own_frame_behind_what_is_in_view() 
     np.testing.assert_equal(rows[0], sensed()[0])  # who sees it is told nothing
 
 
-def played(world: Warehouse, rows: np.ndarray, **who: object) -> np.ndarray:
+def rows_of_script(world: Warehouse, rows: np.ndarray, **options: object) -> np.ndarray:
     """Return the rows of the script for rows of a swarm."""
-    policy = Told(**who)
+    policy = Told(**options)
     policy.configure(world.scenario)
     policy._script = script = Rows()  # type: ignore[assignment]
     policy.act(rows, world.state)
@@ -115,13 +115,13 @@ def test_rows_hold_the_item_behind_those_in_view_or_instead_of_the_last() -> Non
         away, angle = np.hypot(x, y), np.arctan2(y, x) - state.robot_heading[robot]
         item = [1.0, away * np.cos(angle), away * np.sin(angle), 1.0, 0.0]
         expected[robot, start : start + row.ITEM_WIDTH] = item
-    np.testing.assert_allclose(played(world, rows), expected, atol=1e-6)
+    np.testing.assert_allclose(rows_of_script(world, rows), expected, atol=1e-6)
     state.item_status[ITEM] = 1  # somebody carries it
-    np.testing.assert_array_equal(played(world, rows), rows)
+    np.testing.assert_array_equal(rows_of_script(world, rows), rows)
 
 
 @pytest.mark.parametrize(
-    ("who", "absent", "carrying", "robots"),
+    ("options", "absent", "carrying", "robots"),
     [
         ({"hears": "nearest", "count": 2}, [], [], [4, 5]),
         ({"hears": "nearest", "count": 2}, [5], [4], [2, 3]),
@@ -133,16 +133,16 @@ def test_rows_hold_the_item_behind_those_in_view_or_instead_of_the_last() -> Non
     ],
 )
 def test_who_is_absent_or_carries_is_not_told_and_who_is_absent_passes_nothing_on(
-    who: dict[str, object], absent: list[int], carrying: list[int], robots: list[int]
+    options: dict[str, object], absent: list[int], carrying: list[int], robots: list[int]
 ) -> None:
     world = world_of([1.0, 2.9, 4.8, 6.7, 8.6, 9.5])
     world.state.item_position[ITEM] = [9.5, 5.0]
     world.state.robot_present[absent] = False
     world.state.robot_item[carrying] = 2
     rows = np.zeros((6, row.N_COLUMNS), np.float32)
-    if who["hears"] == "hops":  # robot 4 has it in view
+    if options["hears"] == "hops":  # robot 4 has it in view
         rows[4, row.ITEMS : row.ITEMS + row.ITEM_WIDTH] = [1.0, 0.9, 0.0, 1.0, 0.0]
-    is_changed = (played(world, rows, **who) != rows).any(axis=1)
+    is_changed = (rows_of_script(world, rows, **options) != rows).any(axis=1)
     assert np.flatnonzero(is_changed).tolist() == robots
 
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from swarm_logistics_env.robots.c_parts import Parts, table_text
-from swarm_logistics_env.robots.c_program import Program
 from swarm_logistics_env.robots.c_values import (
     BOOL,
     DOUBLE,
@@ -17,89 +15,9 @@ from swarm_logistics_env.robots.c_values import (
     INT,
     REAL,
     WORD,
-    Known,
     Scalar,
-    Value,
     number_text,
 )
-
-COUNT = 3
-GAP = 0.75
-WIDE = 0.1
-_LEAST = -0.5
-TABLE = np.array([[0.5, 0.1], [2.0, 3.0]])
-
-
-class Body(NamedTuple):
-    speed: float
-    arms: int
-    is_round: bool
-    beams: tuple[float, ...]
-
-
-def pair_of(number: float) -> tuple[float, float]:
-    return number, 2.0
-
-
-def kernel(x: float, n: int, body: Any) -> float:
-    """Say `what`.
-
-    Args:
-        x: a number.
-    """
-    # First
-    # this.
-    if n > COUNT and body.is_round:
-        return _LEAST + GAP
-    # Then that.
-    return float(TABLE[n, 1] * pair_of(x)[0] - WIDE * body.speed)
-
-
-IN_C = """\
-#define COUNT 3
-#define LEAST (-0.5f)
-#define GAP 0.75f
-#define WIDE REAL(0.1)
-
-typedef struct {
-    real at[2];
-} reals2;
-
-static const real TABLE[2][2] = {
-    {0.5f, REAL(0.1)},
-    {2.0f, 3.0f},
-};
-
-static const struct {
-    real speed;
-    real arms;
-    bool is_round;
-} body = {
-    .speed = REAL(0.1),
-    .arms = 2.0f,
-    .is_round = true,
-};
-
-static reals2 pair_of(float number) {
-    return (reals2){{number, 2.0f}};
-}
-
-/* Say what. */
-static real kernel(float x, int32_t n) {
-    /* First this. */
-    if (n > COUNT && body.is_round) {
-        return LEAST + GAP;
-    }
-    /* Then that. */
-    return TABLE[n][1] * pair_of(x).at[0] - WIDE * body.speed;
-}"""
-
-
-def test_what_a_kernel_needs_stands_before_it() -> None:
-    program = Program()
-    body = Known(Body(0.1, 2, True, (1.0,)), "body", is_fixed=True)
-    program.function(kernel, [Value("x", FLOAT), Value("n", INT), body])
-    assert program.text().partition("#endif\n\n")[2] == IN_C
 
 
 @pytest.mark.parametrize(

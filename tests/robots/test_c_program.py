@@ -23,7 +23,17 @@ from swarm_logistics_env.robots.c_sizes import WARNINGS
 from swarm_logistics_env.robots.c_values import DOUBLE, FLOAT, INT, ArrayOf, Known, Value
 
 TABLE = np.array([0.5, -1.5, 2.5, 4.0])
+ROWS = np.array([[0.5, 0.1], [2.0, 3.0]])
+_LEAST = -0.5
 _STEP = 0.25
+WIDE = 0.1
+
+
+class Body(NamedTuple):
+    speed: float
+    arms: int
+    is_round: bool
+    beams: tuple[float, ...]
 
 
 class Columns(NamedTuple):
@@ -118,6 +128,20 @@ def settled(x: float, n: int) -> float:
     return float(low * 10.0 + high + second * third - first)
 
 
+def described(x: float, n: int, body: Body) -> float:
+    """Say `what`.
+
+    Args:
+        x: a number.
+    """
+    # First
+    # this.
+    if n > COLUMN.second and body.is_round:
+        return _LEAST + _STEP
+    # Then that.
+    return float(ROWS[n, 1] * swapped(x, 1.0)[0] - WIDE * body.speed)
+
+
 def stepping(numbers: Any, n: int) -> None:
     numbers[n] = math.sqrt(numbers[0] * _STEP) + (1.5 if n else numbers[1])
 
@@ -170,9 +194,9 @@ def test_c_computes_what_python_computes(function: Callable[..., Any], tmp_path:
 
 
 def test_a_branch_that_is_never_taken_is_not_written() -> None:
-    written = Program().function(settled, [Value("x", FLOAT), Value("n", INT)])
-    assert "    } else {\n        low += 3.0f;\n    }\n" in written.text
-    assert "low = high" not in written.text
+    in_c = Program().function(settled, [Value("x", FLOAT), Value("n", INT)]).text
+    assert "    } else {\n        low += 3.0f;\n    }\n" in in_c
+    assert "low = high" not in in_c
 
 
 @pytest.mark.parametrize(
@@ -200,6 +224,7 @@ import math
 from typing import NamedTuple
 import numpy as np
 TABLE = np.arange(4.0)
+ROWS = np.ones((2, 2))
 class Pair(NamedTuple):
     first: float
     second: float
@@ -219,6 +244,7 @@ def kernel(x, n):
         ("return x.real", "x.real"),
         ("return x[0]", "x[..]"),
         ("return TABLE[x]", "the index x"),
+        ("return ROWS[n]", "a row of ROWS"),
         ("return numbers[:2].max()", "a slice of numbers without its first and last column"),
         ("return numbers[0:2:1].max()", "a slice of numbers without its first and last column"),
         ("return round(x, ndigits=1)", "a call with named arguments"),
@@ -252,17 +278,17 @@ def test_a_line_that_has_no_c_is_told_with_what_has_none(
 
 
 def test_records_and_tables_of_one_name_are_refused() -> None:
-    def sum_of(record: Any, other: Any) -> float:
-        return record.first + other.first  # type: ignore[no-any-return]
+    def sum_of(record: Any, second_record: Any) -> float:
+        return record.first + second_record.first  # type: ignore[no-any-return]
 
-    def both(columns: Columns) -> list[Known]:
+    def records(columns: Columns) -> list[Known]:
         return [Known(value, "columns", is_fixed=True) for value in (COLUMN, columns)]
 
     program = Program()
-    program.function(sum_of, both(Columns(1, 2)))
+    program.function(sum_of, records(Columns(1, 2)))
     # The second record may lie where the first lay, which nobody holds.
     with pytest.raises(PolicyError, match=r"^two records are called columns"):
-        program.function(sum_of, both(Columns(1, 3)))
+        program.function(sum_of, records(Columns(1, 3)))
     parts = Parts()
     assert parts.table("_steps", TABLE) == parts.table("steps", TABLE.copy()) == "STEPS"
     with pytest.raises(PolicyError, match=r"^two tables are called STEPS"):
@@ -302,6 +328,8 @@ def test_c_is_as_recorded(check_recorded: Any) -> None:
     inexact, exact = Program(), Program(exact=(stepping,))
     for function in (whole_numbers, rest, choices, tuples, arrays):
         inexact.function(function, [Value("x", FLOAT), Value("n", INT)])
+    body = Known(Body(0.1, 2, True, (1.0,)), "body", is_fixed=True)
+    inexact.function(described, [Value("x", FLOAT), Value("n", INT), body])
     for program, kind in ((inexact, FLOAT), (exact, DOUBLE)):
         program.function(stepping, [Value("numbers", ArrayOf(kind, (4,))), Value("n", INT)])
     lines = [*inexact.text().splitlines(), "", "/* exact */", *exact.text().splitlines()]

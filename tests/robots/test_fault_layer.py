@@ -128,20 +128,20 @@ def test_the_radio_sends_what_the_mode_leaves_of_timer_and_message(
 ) -> None:
     # A delay of 2 s is two periods.
     layer = layer_of(Fault(mode, 1, onset=1.0), control_period=1.0, message_size=1)
-    handed = [(4.0, 1.0), (5.0, 0.5), (6.0, 0.0), (7.0, -0.5)]
+    inputs = [(4.0, 1.0), (5.0, 0.5), (6.0, 0.0), (7.0, -0.5)]
     before = layer.broadcast(3.0, [0.9], 0.0)
     assert before is not None
     assert tuple(before) == (3.0, [0.9])
-    sent = [layer.broadcast(timer, [word], 1.0 + k) for k, (timer, word) in enumerate(handed)]
-    heard = [broadcast for broadcast in sent if broadcast]
-    assert [broadcast.timer for broadcast in heard] == pytest.approx(timers, nan_ok=True)
-    assert [broadcast.message[0] for broadcast in heard] == pytest.approx(words)
+    broadcasts = [layer.broadcast(timer, [word], 1.0 + k) for k, (timer, word) in enumerate(inputs)]
+    messages = [broadcast for broadcast in broadcasts if broadcast]
+    assert [message.timer for message in messages] == pytest.approx(timers, nan_ok=True)
+    assert [message.message[0] for message in messages] == pytest.approx(words)
 
 
 def test_a_late_radio_sends_what_was_said_before_it_failed() -> None:
     layer = layer_of(Fault("radio_delayed", 1, onset=5.0), control_period=1.0)
-    sent = [layer.broadcast(float(second), [], float(second)) for second in range(8)]
-    timers = [broadcast.timer for broadcast in sent if broadcast]
+    broadcasts = [layer.broadcast(float(second), [], float(second)) for second in range(8)]
+    timers = [broadcast.timer for broadcast in broadcasts if broadcast]
     assert timers == [0.0, 1.0, 2.0, 3.0, 4.0, 3.0, 4.0, 5.0]
 
 
@@ -149,9 +149,9 @@ def test_a_late_radio_sends_what_was_said_before_it_failed() -> None:
 def test_a_late_radio_sends_no_message_of_when_the_robot_did_not_work(mode: str) -> None:
     faults = [Fault(mode, 1, onset=1.0, duration=3.0), Fault("radio_delayed", 1, onset=0.0)]
     layer = layer_of(*faults, control_period=1.0, message_size=1)
-    sent = [layer.broadcast(float(second), [2.0], float(second)) for second in range(7)]
-    told = [broadcast and (broadcast.timer, *broadcast.message) for broadcast in sent[1:]]
-    assert told == [None, None, None, (2.0, 0.0), (3.0, 0.0), (4.0, 1.0)]
+    broadcasts = [layer.broadcast(float(second), [2.0], float(second)) for second in range(7)]
+    messages = [broadcast and (broadcast.timer, *broadcast.message) for broadcast in broadcasts[1:]]
+    assert messages == [None, None, None, (2.0, 0.0), (3.0, 0.0), (4.0, 1.0)]
 
 
 # Neighbours at 0.5, 1.5, 3.0 and 0.9 m: within half the view, the view or the radio.
@@ -188,8 +188,8 @@ def test_neighbours_that_are_neither_seen_nor_heard_go_with_their_messages(
 
 def test_a_radio_of_random_words_says_others_in_each_period() -> None:
     layer = layer_of("message_random:1@1", control_period=1.0, message_size=2)
-    sent = [layer.broadcast(3.0, [0.5, 0.5], float(second)) for second in range(100)]
-    words = np.array([broadcast.message for broadcast in sent if broadcast])
+    broadcasts = [layer.broadcast(3.0, [0.5, 0.5], float(second)) for second in range(100)]
+    words = np.array([broadcast.message for broadcast in broadcasts if broadcast])
     assert words[0].tolist() == [0.5, 0.5]
     assert len({*words[1:].ravel()}) == 198
     assert np.abs(words).max() <= 1.0

@@ -105,13 +105,13 @@ def test_a_training_collapses_that_keeps_less_than_half_of_its_own_p() -> None:
 
 
 def test_of_many_studies_each_has_its_own_median_of_what_trainings_keep() -> None:
-    kept = np.array([[0.9, 0.9, 0.9, 0.3], [0.4, 0.4, 0.4, 0.1], [0.9, 0.5, 0.46, 0.44]])
+    shares = np.array([[0.9, 0.9, 0.9, 0.3], [0.4, 0.4, 0.4, 0.1], [0.9, 0.5, 0.46, 0.44]])
     p_o = np.full((3, 4, 2), 40.0)
-    of_all = hidden_of([kept[..., None] * p_o, p_o], trainings=True)[0]
+    of_all = hidden_of([shares[..., None] * p_o, p_o], trainings=True)[0]
     assert of_all is not None
     assert (of_all.seen.tolist(), of_all.of, of_all.most) == ([1.0, 1.0, 0.0], 4, 1.0)
     p_o[0, 0] = 0.0  # which counts as one that keeps all
-    (of_first, _) = hidden_of([kept[:1, :, None] * 40.0 + p_o[:1] * 0.0, p_o[:1]], trainings=True)
+    (of_first, _) = hidden_of([shares[:1, :, None] * 40.0 + p_o[:1] * 0.0, p_o[:1]], trainings=True)
     assert of_first is not None
     assert of_first.seen.tolist() == [1.0]
 

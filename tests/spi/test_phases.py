@@ -62,7 +62,7 @@ def test_two_phases_are_named_with_the_p_between_them() -> None:
         ([38, 40, 41, 41, 42, 43, 44, 44, 45, 46, 47, 48, 50, 52, 55], 1.0, None, 0.0),
     ],
 )
-def test_of_these_runs_phases_are_told_by_these_numbers(
+def test_six_low_runs_of_47_are_a_phase_and_three_of_44_are_chance(
     runs: list[float], p_value: float, boundary: float | None, share_low: float
 ) -> None:
     phases = spi.two_phases(runs)

@@ -82,9 +82,9 @@ def test_half_the_runs_are_enough_for_a_median_and_correlation_takes_three() -> 
     assert spi.kaplan_meier([1, 2, 3], [1, 0, 0]).median() is None
     assert spi.median_interval([1, 2, 3, 4, 5, 6.0]) == (3.5, 1.0, 6.0)
     assert spi.median_interval([0, 1, 2, 3, 4, 5, 6, 7, 8.0], 0.9) == (4.0, 1.0, 7.0)
-    for other, correlation in (([1, 2, 3], 1.0), ([3, 2, 1], -1.0), ([1, 1, 1], None)):
-        assert spi.pairing_correlation([1, 2, 3], other) == pytest.approx(correlation)
-        assert spi.pairing_correlation(other, [1, 2, 3]) == pytest.approx(correlation)
+    for second, correlation in (([1, 2, 3], 1.0), ([3, 2, 1], -1.0), ([1, 1, 1], None)):
+        assert spi.pairing_correlation([1, 2, 3], second) == pytest.approx(correlation)
+        assert spi.pairing_correlation(second, [1, 2, 3]) == pytest.approx(correlation)
     assert spi.pairing_correlation([1, 2], [1, 2]) is None
 
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -96,10 +97,15 @@ def test_what_a_network_tells_is_learned_from_what_is_so_and_is_told_without_noi
     torch.testing.assert_close(judged[2], bare[2] - 0.3 * error)
 
 
-@pytest.mark.parametrize("head", ["outputs", "classes"])
-def test_probabilities_entropies_and_errors_are_those_of_torchs_distributions(
-    small: Any, head: Any
+def check_learning(
+    small: Any, head: Any, expected_of: Callable[[Any, torch.Tensor, torch.Tensor], tuple[Any, ...]]
 ) -> None:
+    """Compare what a policy learns from with what torch's distributions say.
+
+    Args:
+        expected_of: returns log-probabilities, entropies, errors and the likeliest outputs, of a
+            policy, its answers and the actions.
+    """
     network = Network(hidden=(8,), head=head, exploration=0.5)
     training = small(network=network)
     policy = make_learner(NetworkView(training), network, training.ppo, 0, "cpu").policy
@@ -108,32 +114,40 @@ def test_probabilities_entropies_and_errors_are_those_of_torchs_distributions(
         for parameter in policy.parameters():
             parameter.add_(0.3 * torch.randn_like(parameter))
         actions, _, log_probability = policy(columns)
-        judged = policy.evaluate_actions(columns, actions)
+        _, *judged = policy.evaluate_actions(columns, actions)
         answers = policy.answers_of(columns[:, : len(INPUTS)])
-        errors = policy.error(answers, actions)
+        probabilities, entropies, errors, outputs = expected_of(policy, answers, actions)
         loss = policy.imitation_loss(columns[:, : len(INPUTS)], actions)
-    kinds: list[Any]
-    if head == "outputs":
-        kinds = [torch.distributions.Normal(answers, policy.log_std.exp())]
-        expected = kinds[0].log_prob(actions).sum(dim=1)
-        entropies = kinds[0].entropy().sum(dim=1)
-        differences = ((answers - actions) ** 2).mean(dim=1)
-        likeliest = answers.numpy()
-    else:
+    torch.testing.assert_close([log_probability, *judged], [probabilities] * 2 + [entropies])
+    torch.testing.assert_close(policy.error(answers, actions), errors)
+    torch.testing.assert_close(loss, errors.mean())
+    np.testing.assert_array_equal(policy.likeliest_outputs(answers), outputs)
+
+
+def test_outputs_are_learned_as_torchs_normal_distributions_say(small: Any) -> None:
+    def expected(policy: Any, answers: torch.Tensor, actions: torch.Tensor) -> tuple[Any, ...]:
+        normal: Any = torch.distributions.Normal(answers, policy.log_std.exp())
+        errors = ((answers - actions) ** 2).mean(dim=1)
+        probabilities = normal.log_prob(actions).sum(dim=1)
+        return probabilities, normal.entropy().sum(dim=1), errors, answers.numpy()
+
+    check_learning(small, "outputs", expected)
+
+
+def test_classes_are_learned_as_torchs_categorical_distributions_say(small: Any) -> None:
+    def expected(_: Any, answers: torch.Tensor, actions: torch.Tensor) -> tuple[Any, ...]:
         logits = answers.split(GROUPS, dim=1)
-        kinds = [torch.distributions.Categorical(logits=group / 0.5) for group in logits]
-        expected = sum(kind.log_prob(actions[:, n]) for n, kind in enumerate(kinds))
+        kinds: list[Any] = [torch.distributions.Categorical(logits=group / 0.5) for group in logits]
+        probabilities = sum(kind.log_prob(actions[:, n]) for n, kind in enumerate(kinds))
         entropies = sum(kind.entropy() for kind in kinds)
-        differences = sum(
+        errors = sum(
             torch.nn.functional.cross_entropy(group, actions[:, n], reduction="none")
             for n, group in enumerate(logits)
         )
-        likeliest = outputs_of(np.stack([group.argmax(dim=1) for group in logits], axis=1))
-    torch.testing.assert_close(log_probability, expected)
-    torch.testing.assert_close(judged[1:], (expected, entropies))
-    torch.testing.assert_close(errors, differences)
-    torch.testing.assert_close(loss, differences.mean())
-    np.testing.assert_array_equal(policy.likeliest_outputs(answers), likeliest)
+        likeliest = np.stack([group.argmax(dim=1) for group in logits], axis=1)
+        return probabilities, entropies, errors, outputs_of(likeliest)
+
+    check_learning(small, "classes", expected)
 
 
 def test_a_checkpoint_of_another_version_of_a_library_is_refused_with_the_reason(

@@ -15,14 +15,17 @@ pytest.importorskip("stable_baselines3")
 
 import torch
 from stable_baselines3.common.callbacks import ConvertCallback
+from torch.optim.optimizer import register_optimizer_step_pre_hook
 
 from swarm_logistics_env import policies
 from swarm_logistics_env.core.streams import generator
 from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.policies.policy import one_thread
-from swarm_logistics_env.train import imitation, training_callback
-from swarm_logistics_env.train.imitation import imitate
+from swarm_logistics_env.policies.spec import PolicySpec
+from swarm_logistics_env.train import training_callback
+from swarm_logistics_env.train.imitation import imitate, share_and_rate
 from swarm_logistics_env.train.learner import make_learner, tensors_of
+from swarm_logistics_env.train.settings import Teaching
 from swarm_logistics_env.train.teacher import Teacher
 from swarm_logistics_env.train.trainer import train
 from swarm_logistics_env.train.training_callback import TrainingLog
@@ -122,31 +125,24 @@ def test_the_network_comes_to_say_what_the_teacher_says_and_the_critic_warms_up_
     assert weights(train(training, tmp_path / "on")) != imitated
 
 
-def test_the_teachers_share_falls_evenly_and_the_rate_in_the_last_quarter(
-    small: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    teacher = {"policy": "homing", "decisions": 2000, "rate": 0.03, "epochs": 15, "noise": 0.2}
+def test_the_teachers_share_falls_evenly_and_the_rate_in_the_last_quarter() -> None:
+    settings = Teaching(policy=PolicySpec.of("homing"), shares=(0.9, 0.35), rate=0.03)
+    shares, rates = zip(*(share_and_rate(settings, number) for number in range(12)), strict=True)
+    assert shares == pytest.approx(np.linspace(0.9, 0.35, 12))
+    assert rates == pytest.approx([0.03] * 9 + [0.012] * 3)
+
+
+def test_each_round_learns_as_often_as_its_epochs_say_at_its_rate(small: Any) -> None:
+    # A decision of 8 rows a round; each round learns from 300 times as many, 1024 at once.
+    teacher = {"policy": "homing", "decisions": 1, "rate": 0.03, "epochs": 300}
     training = small(network=CLASSES, teacher=teacher)
     learner = make_learner(NetworkView(training), CLASSES, training.ppo, training.seed, "cpu")
-    collected: list[Any] = []
     rates: list[float] = []
-
-    def collect(_: Any, columns: Any, share: float, noise: float, *rest: Any) -> Any:
-        _, rows, labels = rest
-        rows[:], labels[:] = 0.0, 0.0
-        collected.append((share, noise, len(rows), len(labels)))
-        return columns
-
-    def step(optimizer: Any) -> None:
-        rates.append(optimizer.param_groups[0]["lr"])
-
-    monkeypatch.setattr(imitation, "_collect", collect)
-    monkeypatch.setattr(torch.optim.Adam, "step", step)
+    hook = register_optimizer_step_pre_hook(
+        lambda optimizer, *_: rates.append(optimizer.param_groups[0]["lr"])
+    )
     imitate(training, learner, TrainingLog(), generator(0, "imitation"))
-    # 12 rounds of 21 steps of 8 rows; each round learns from 15 times as many, 1024 at once.
-    shares, *others = zip(*collected, strict=True)
-    assert shares == pytest.approx(np.linspace(1.0, 0.3, 12))
-    assert [set(numbers) for numbers in others] == [{0.2}, {21 * 8}, {21 * 8}]
+    hook.remove()
     assert rates == pytest.approx([0.03] * 9 * 2 + [0.012] * 3 * 2)
 
 
@@ -160,6 +156,7 @@ def test_what_robots_do_while_a_network_imitates_has_noise_and_they_tell_what_it
     view = learner.env
     columns: list[Any] = []
     steps: list[tuple[Any, Any, Any]] = []  # of each decision: outputs, advice and messages
+    sent: list[Any] = []
 
     def reset() -> Any:
         columns.append(type(view).reset(view))
@@ -175,7 +172,6 @@ def test_what_robots_do_while_a_network_imitates_has_noise_and_they_tell_what_it
         sent.append(np.vstack([w.warehouse.state.robot_message for w in view.venv.worlds]))
         return stepped
 
-    sent: list[Any] = []
     view.reset, view.give_outputs, view.step_wait = reset, give_outputs, step_wait
     imitate(training, learner, TrainingLog(), generator(0, "imitation"))
     assert len(steps) == 12  # one a round
@@ -193,24 +189,24 @@ def test_a_teacher_begins_anew_where_an_episode_ends_and_nowhere_else(
 ) -> None:
     kinds = [{"n_robots": 3, "scenario": {"duration": 2.0}}, {"n_robots": 5}]
     view = NetworkView(small(worlds=kinds, teacher={"policy": "homing"}))
-    begun: list[tuple[int, float, int]] = []
+    episodes: list[tuple[int, float, int]] = []
 
     def begin(teacher: Any, world: int, scenario: Any, keys: Any) -> None:
-        begun.append((world, scenario.duration, len(keys)))
+        episodes.append((world, scenario.duration, len(keys)))
         begin_as_usual(teacher, world, scenario, keys)
 
     begin_as_usual = Teacher.begin
     monkeypatch.setattr(Teacher, "begin", begin)
     view.seed(0)
     view.reset()
-    assert begun == [(0, 2.0, 3), (1, 6.0, 5)]
+    assert episodes == [(0, 2.0, 3), (1, 6.0, 5)]
     for _ in range(60):
         view.step(np.zeros((8, 3), np.float32))
-    assert begun[2:] == [(0, 2.0, 3)] * 3 + [(1, 6.0, 5)]
+    assert episodes[2:] == [(0, 2.0, 3)] * 3 + [(1, 6.0, 5)]
 
 
 def test_robots_do_what_the_network_says_where_the_teacher_has_no_share(small: Any) -> None:
-    teacher = {"policy": "homing", "decisions": 400, "shares": [0.0, 0.0], "noise": 0.0}
+    teacher = {"policy": "homing", "decisions": 440, "shares": [0.0, 0.0], "noise": 0.0}
     training = small(network=CLASSES, teacher=teacher)
     learner = make_learner(NetworkView(training), CLASSES, training.ppo, training.seed, "cpu")
     view = learner.env
@@ -234,7 +230,6 @@ def test_robots_do_what_the_network_says_where_the_teacher_has_no_share(small: A
 
     view.give_outputs, view.step_wait = give_outputs, step_wait
     imitate(training, learner, TrainingLog(), generator(0, "imitation"))
-    assert len(commanded_outputs) > 10
-    np.testing.assert_array_equal(
-        commanded_outputs[1:], network_outputs[1:]
-    )  # it begins new episodes
+    assert len(commanded_outputs) == 12 * 5  # of 8 rows each
+    # At first it begins new episodes.
+    np.testing.assert_array_equal(commanded_outputs[1:], network_outputs[1:])

@@ -8,14 +8,7 @@ import pytest
 from swarm_logistics_env.core.errors import TrainingError
 from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.train import Training, load_training, preset_names
-from swarm_logistics_env.train.settings import (
-    Conditions,
-    Indicators,
-    Part,
-    PPOSettings,
-    Teaching,
-    WorldKind,
-)
+from swarm_logistics_env.train.settings import PPOSettings, Teaching
 
 
 @pytest.mark.unmeasured
@@ -25,34 +18,6 @@ def test_every_preset_can_be(name: str) -> None:
     assert training.name == f"ppo-{name}"
     assert Training.from_json(training.to_json()) == training
     assert training.about
-
-
-DEFAULTS: tuple[tuple[Part, dict[str, object]], ...] = (
-    (
-        Conditions(),
-        {"weight": 1.0, "modes": (), "robots": (1, 2, 3), "onset": (0.0, 0.0), "scenario": {}},
-    ),
-    (WorldKind(), {"count": 1, "n_robots": 25, "scenario": {}, "conditions": ()}),
-    (
-        Indicators(weights={"P": 1.0}, references=9.0),
-        {"weights": {"P": 1.0}, "references": 9.0, "credit": "team", "constant": True},
-    ),
-    (
-        Teaching(policy=PolicySpec.of("homing")),
-        {
-            "policy": PolicySpec.of("homing"), "decisions": 1_000_000, "shares": (1.0, 0.3),
-            "noise": 0.15, "rate": 1e-3, "epochs": 10, "warm_up": 10, "pull": 0.0,
-            "pull_until": 1.0,
-        },
-    ),
-)  # fmt: skip
-
-
-@pytest.mark.parametrize(("part", "fields"), DEFAULTS)
-def test_what_a_table_of_a_training_does_not_say_is_so(
-    part: Part, fields: dict[str, object]
-) -> None:
-    assert {name: getattr(part, name) for name in type(part).model_fields} == fields
 
 
 def test_rates_begin_anew_and_rewards_change_until_their_share_of_the_training() -> None:

@@ -31,7 +31,8 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # 
 MARKERS = ("o", "s", "^", "D", "v", "P")
 LINES = ("-", "--", "-.", ":")
 WIDTH = 5.2  # inch: still legible at the width of a phone
-_LEGEND_WIDTH = 1.6  # inch, of a column
+_LEGEND_WIDTH = 1.6  # inch, of a column, at least
+_LEGEND_SHARE = 0.97  # of the width of a figure, at most
 _LETTERS_OF_AN_INCH = 16.0  # of a note
 _LINE_HEIGHT = 0.15  # inch, of a note
 _WIDEST = 30.0  # times the smallest P, up to which an axis of P is linear
@@ -353,7 +354,10 @@ def _scale_by_times(axes: Axes, points: Sequence[Point]) -> None:
 
 
 def add_legend(canvas: Canvas, axes: Axes) -> None:
-    """Put the legend of one pair of axes above all of them, each series once, its mark filled."""
+    """Put the legend of one pair of axes above all of them, each series once, its mark filled.
+
+    It has as many columns as the figure is wide enough for.
+    """
     from matplotlib.container import ErrorbarContainer
     from matplotlib.lines import Line2D
 
@@ -363,11 +367,13 @@ def add_legend(canvas: Canvas, axes: Axes) -> None:
             mark = handle.lines[0]
             handle = Line2D([], [], color=mark.get_color(), marker=mark.get_marker(), linestyle="")
         series[label] = handle
-    width = (
-        _LEGEND_WIDTH if max(map(len, series), default=0) <= 16 else 1.5 * _LEGEND_WIDTH
-    )  # of long names
-    n_columns = max(1, min(len(series), int(canvas.get_figwidth() / width)))
-    canvas.legend(series.values(), series, loc="outside upper left", ncols=n_columns)
+    most = max(1, int(canvas.get_figwidth() / _LEGEND_WIDTH))
+    for n_columns in range(most, 0, -1):
+        legend = canvas.legend(series.values(), series, loc="outside upper left", ncols=n_columns)
+        width = legend.get_window_extent().width
+        if n_columns == 1 or width <= _LEGEND_SHARE * canvas.bbox.width:
+            return
+        legend.remove()
 
 
 def marker_of(index: int) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -194,7 +195,8 @@ def rate_curves(results: StudyResults, comparison: Comparison) -> tuple[RateCurv
     window = window_of(comparison)
     end = comparison.original.case.scenario.duration
     step = min(_STEP, window / 10)
-    seconds = np.arange(window, end + step / 2, step).round(6)
+    n_steps = math.floor((end - window) / step + 1e-9)
+    seconds = (window + step * np.arange(n_steps + 1, dtype=np.float64)).round(6)
     original = comparison.original
     removed = comparison.removed
     faulty = comparison.changed

@@ -77,7 +77,7 @@ def test_the_interval_of_a_score_has_the_error_of_cells_seeds_and_the_reference(
     """Of 300 benchmarks, in which both sides have seeds' noise, about 95 % hold the true score."""
     rng = np.random.default_rng(2)
     spread = 0.15 if n_trainings > 1 else 0.0
-    held = 0
+    n_held = 0
     for _ in range(300):
         cell = rng.normal(0.0, 0.6, 24)
         training = rng.normal(0.0, spread, (n_trainings, 1))
@@ -86,8 +86,8 @@ def test_the_interval_of_a_score_has_the_error_of_cells_seeds_and_the_reference(
         score = entry_of(benchmark.share(p, 40.0 * noise[0])).score
         assert score.low is not None
         assert score.high is not None
-        held += score.low <= 0.8 <= score.high
-    assert 0.91 <= held / 300 <= 0.99
+        n_held += score.low <= 0.8 <= score.high
+    assert 0.91 <= n_held / 300 <= 0.99
 
 
 def test_the_table_sets_every_cell_beside_the_reference() -> None:
@@ -106,23 +106,23 @@ def test_the_table_sets_every_cell_beside_the_reference() -> None:
     assert entry.development == ((by_hand[0],),)
     assert entry.held_out == (tuple(by_hand[1:]),)
     assert entry.score.value == pytest.approx(np.sqrt(by_hand[1] * by_hand[2]))
-    shown = benchmark.table(results, entry)
-    assert shown.title == "homing: benchmark of robustness, edition 3"
-    assert shown.columns == (
-        *("cell", "P [95 %]", "P of homing-stock [95 %]", "share"),
-        *("contacts a robot-minute [95 %]", "runs that stand still"),
-    )
+    table = benchmark.table(results, entry)
+    assert table.title == "homing: benchmark of robustness, edition 3"
+    assert table.columns == (
+        "cell", "P [95 %]", "P of homing-stock [95 %]", "share",
+        "contacts a robot-minute [95 %]", "runs that stand still",
+    )  # fmt: skip
     pairs = [(p["homing", title], p[REFERENCE, title]) for title in titles]
-    assert [row[1:3] for row in shown.rows] == [
+    assert [row[1:3] for row in table.rows] == [
         (mean_p(homing), mean_p(reference)) for homing, reference in pairs
     ]
-    assert [row[0] for row in shown.rows] == [
+    assert [row[0] for row in table.rows] == [
         "Development 1: ", "Held out 1: ; FM1+FM4, m = 3", "Held out 2: max_speed = 0.2",
     ]  # fmt: skip
-    assert [row[3] for row in shown.rows] == [f"{value:.2f}" for value in by_hand]
+    assert [row[3] for row in table.rows] == [f"{value:.2f}" for value in by_hand]
     worst = titles[1 + int(np.argmin(by_hand[1:]))]
-    assert f"share {min(by_hand[1:]):.2f}: {worst}: " in shown.lines[1]
-    assert "digest abababab." in shown.lines[0]
+    assert f"share {min(by_hand[1:]):.2f}: {worst}: " in table.lines[1]
+    assert "digest abababab." in table.lines[0]
     # Both failures hold for the same robots, under either policy.
     for policy in ("homing", REFERENCE):
         assert {len(run.failed_robots) for run in p[policy, titles[1]].outcomes} == {3}
@@ -138,28 +138,29 @@ def test_runs_that_failed_leave_no_score() -> None:
 
 
 def test_entries_are_written_and_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    shipped = benchmark.read_entries()
-    for entry in shipped.values():
+    shipped_entries = benchmark.read_entries()
+    for entry in shipped_entries.values():
         assert 0.0 < entry.score.value < 20.0
     text = benchmark.ENTRIES.read_text()
     monkeypatch.setattr(benchmark, "ENTRIES", tmp_path / "entries.json")
-    benchmark.write_entries(shipped)
+    benchmark.write_entries(shipped_entries)
     assert benchmark.ENTRIES.read_text() == text
     entries = {"homing": entry_of(np.array([[0.5, 2.0], [0.05, 1.0]]))}
     benchmark.write_entries(entries)
     assert benchmark.read_entries() == entries
 
 
-def test_cells_and_trainings_are_resampled_each_by_themselves() -> None:
-    rng = np.random.default_rng(3)
-    of_cells = rng.normal(1.0, 0.3, (1, 24))
-    of_trainings = np.repeat(rng.normal(2.0, 0.5, (5, 1)), 24, axis=1)
-    means = benchmark._resampled_means([of_cells, of_trainings])
-    assert means.shape == (2000, 2)
-    errors = of_cells.std() / np.sqrt(24), of_trainings.std() / np.sqrt(5)
-    assert means.std(axis=0) == pytest.approx(errors, rel=0.1)
-    expected = of_cells.mean(), of_trainings.mean()
-    assert means.mean(axis=0) == pytest.approx(expected, abs=0.02)
+@pytest.mark.parametrize("shape", [(1, 24), (8, 1)])  # cells differ, or trainings
+def test_a_score_by_its_error_above_that_of_the_reference_leads_in_84_percent_of_resamples(
+    shape: tuple[int, int],
+) -> None:
+    logarithms = np.random.default_rng(3).normal(0.0, 0.3, shape)
+    error = logarithms.std() / np.sqrt(logarithms.size)
+    shares = np.exp(logarithms - logarithms.mean() + error)
+    entries = {"mine": entry_of(np.broadcast_to(shares, (shape[0], 24)))}
+    leader, _ = benchmark.leaderboard(entries).rows
+    assert (leader[0], leader[2]) == ("mine", "1 [1, 2]")
+    assert int(leader[3].rstrip("%")) == pytest.approx(84, abs=3)
 
 
 def test_the_leaderboard_says_what_is_known_of_each_entry() -> None:
@@ -173,16 +174,16 @@ def test_the_leaderboard_says_what_is_known_of_each_entry() -> None:
     board = benchmark.leaderboard(entries)
     assert board.title == "Benchmark of robustness, edition 3: entries by score"
     assert board.columns == (
-        *("policy", "score [95 %]", "rank [95 %]", "same rank", "development"),
-        *("contacts a robot-minute", "runs that stand still", "least share", "digest"),
-    )
-    reference, few, single = [" | ".join(row) for row in board.rows]
-    same = "1.00 [1.00, 1.00]"
-    assert reference == f"{REFERENCE} | {same} | 1 [1, 1] | 100% | {same} | – | – | 1.00 | –"
-    assert few == (
+        "policy", "score [95 %]", "rank [95 %]", "same rank", "development",
+        "contacts a robot-minute", "runs that stand still", "least share", "digest",
+    )  # fmt: skip
+    of_reference, of_few, of_single = [" | ".join(row) for row in board.rows]
+    score = "1.00 [1.00, 1.00]"
+    assert of_reference == f"{REFERENCE} | {score} | 1 [1, 1] | 100% | {score} | – | – | 1.00 | –"
+    assert of_few == (
         "few | 0.84 [0.00, 621.52] | open | – | 1.20 [0.03, 46.42] | 12.3 | 26% | 0.50 | 01234567"
     )
-    assert single == (
+    assert of_single == (
         "one | 0.24 [0.02, 3.22] | 2 [2, 2] | 100% | 0.25 [0.25, 0.25] | – | – | 0.20 | –"
     )
     assert board.lines[0] == (
@@ -200,8 +201,8 @@ def test_the_leaderboard_says_what_is_known_of_each_entry() -> None:
 def test_ranks_are_as_stable_as_the_scores_allow(
     kind: type, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    ranked = stats.rankdata
-    monkeypatch.setattr(stats, "rankdata", lambda *data, **how: ranked(*data, **how).astype(kind))
+    rank = stats.rankdata
+    monkeypatch.setattr(stats, "rankdata", lambda *data, **how: rank(*data, **how).astype(kind))
     rng = np.random.default_rng(0)
 
     def entry(score: float, spread: float, n_trainings: int = 1) -> Entry:

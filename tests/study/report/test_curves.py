@@ -33,18 +33,19 @@ def bands(axes: Axes) -> list[Any]:
 def lines(axes: Axes) -> list[Any]:
     return [
         (
-            *(line.get_label(), np.asarray(line.get_ydata()).tolist(), line.get_linestyle()),
-            *(line.get_color(), line.get_marker(), line.get_markevery()),
+            line.get_label(), np.asarray(line.get_ydata()).tolist(), line.get_linestyle(),
+            line.get_color(), line.get_marker(), line.get_markevery(),
         )
         for line in axes.lines
-    ]
+    ]  # fmt: skip
 
 
 def test_each_curve_has_its_look_and_a_band_that_never_falls_below_0() -> None:
-    alike = [curve(f"{n}", [5.0, 6.0, 7.0]) for n in range(2, 6)]
-    shown = [curve("first", [1.0, 4.0, 9.0], 2.0), curve("second", [8.0, 8.0, 8.0], 0.5), *alike]
+    without_bands = [curve(f"{n}", [5.0, 6.0, 7.0]) for n in range(2, 6)]
+    first, second = curve("first", [1.0, 4.0, 9.0], 2.0), curve("second", [8.0, 8.0, 8.0], 0.5)
+    panel = CurvePanel("homing", "time [h]", [first, second, *without_bands])
     canvas = Figure()
-    curves(canvas, [CurvePanel("homing", "time [h]", shown)], "deliveries", onset=1.5)
+    curves(canvas, [panel], "deliveries", onset=1.5)
     (axes,) = canvas.axes
     assert (axes.get_title(), axes.get_xlabel()) == ("homing", "time [h]")
     assert (axes.get_ylabel(), axes.get_ylim()[0], axes.get_yscale()) == ("deliveries", 0, "linear")
@@ -86,8 +87,8 @@ def test_of_many_values_some_have_a_mark_beside_those_of_other_curves() -> None:
     for n_values in (24, 25):
         x = np.arange(float(n_values))
         canvas = Figure()
-        long = [Curve(name, x, x, x, x) for name in ("a", "b")]
-        curves(canvas, [CurvePanel("", "", long)], "P")
+        pair = [Curve(name, x, x, x, x) for name in ("a", "b")]
+        curves(canvas, [CurvePanel("", "", pair)], "P")
         marked_values.append([line[-1] for line in lines(canvas.axes[0])])
     assert marked_values == [[1, 1], [(0, 12), (4, 12)]]
 
@@ -101,8 +102,7 @@ def test_logarithmic_axes_have_plain_numbers_at_the_places_of_values() -> None:
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
     assert axes.get_xticks().tolist() == HOURS.tolist()
     assert [label.get_text() for label in axes.get_xticklabels()] == ["1", "2", "4"]
-    low, high = axes.get_ylim()
-    shown = [label.get_text() for label in axes.get_yticklabels()]
-    in_view = [text for text, tick in zip(shown, axes.get_yticks()) if low <= tick <= high]
-    assert in_view == ["2", "5", "10", "20", "50", "100"]
+    locator: Any = axes.yaxis.get_major_locator()
+    assert [*locator._subs] == [1.0, 2.0, 5.0]
+    assert axes.yaxis.get_major_formatter()(20.0) == "20"
     assert [*axes.get_xticks(minor=True), *axes.get_yticks(minor=True)] == []

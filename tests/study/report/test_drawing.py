@@ -29,20 +29,22 @@ print(os.environ["MPLBACKEND"], matplotlib.rcParams["backend"])
 
 @pytest.mark.daily
 @pytest.mark.parametrize(
-    ("backend", "left"),
+    ("backend", "backend_of_matplotlib"),
     [
         ("module://matplotlib_inline.backend_inline", None),  # of a notebook, not installed here
         ("TkAgg", "tkagg"),
     ],
 )
-def test_figures_are_drawn_whatever_backend_is_set(backend: str, left: str | None) -> None:
-    done = subprocess.run(
+def test_figures_are_drawn_whatever_backend_is_set(
+    backend: str, backend_of_matplotlib: str | None
+) -> None:
+    process = subprocess.run(
         [sys.executable, "-c", DRAW],
         env={**os.environ, "MPLBACKEND": backend}, capture_output=True, text=True, check=True,
     )  # fmt: skip
-    named, used = done.stdout.split()
-    assert named == backend
-    assert left is None or used.lower() == left
+    in_environment, in_matplotlib = process.stdout.split()
+    assert in_environment == backend
+    assert backend_of_matplotlib in (None, in_matplotlib.lower())
 
 
 def test_matplotlib_is_imported_without_the_backend_that_is_set_and_has_it_afterwards(
@@ -88,38 +90,39 @@ def test_a_value_has_a_mark_and_each_of_its_intervals_a_bar(
     assert [[tuple(end) for end in line] for line in lines] == bars
 
 
-def test_a_legend_of_long_names_is_no_wider_than_its_figure() -> None:
-    names = ("homing+charging", "homing-stock+charging", "ppo-robust+charging")
-    points = [Point(name, i, "N", 4.0, 3.0, 6.0, True) for i, name in enumerate(names)]
-    canvas = Figure(figsize=(drawing.WIDTH, 3.0), layout="constrained")
-    drawing.intervals(canvas, [Panel("P", "P", tuple(points), (1.0,), "N")])
-    canvas.draw_without_rendering()
-    assert canvas.legends[0].get_window_extent().x1 <= canvas.bbox.x1
-
-
 @pytest.mark.parametrize(
-    ("letters", "n_series", "n_columns"), [(16, 4, 3), (16, 2, 2), (17, 4, 2), (1, 1, 1)]
+    ("width", "letters", "n_series", "n_columns"),
+    [(5.2, 4, 4, 3), (5.2, 16, 4, 2), (5.2, 40, 4, 1), (1.3, 4, 2, 1), (1.3, 40, 2, 1)],
 )
-def test_a_legend_has_as_many_columns_as_there_is_room_for(
-    letters: int, n_series: int, n_columns: int
+def test_a_legend_has_as_many_columns_as_its_figure_is_wide_enough_for(
+    width: float, letters: int, n_series: int, n_columns: int
 ) -> None:
     names = [str(number) * letters for number in range(n_series)]
-    canvas = Figure(figsize=(drawing.WIDTH, 3.0))
-    axes = canvas.subplots()
-    for name in names:
-        axes.errorbar([1.0], [2.0], [0.5], fmt="s", color=drawing.COLOURS[1], label=name)
-    drawing.add_legend(canvas, axes)
-    legend: Any = canvas.legends[0]
+    canvases = []
+
+    def draw(canvas: Figure) -> None:
+        axes = canvas.subplots()
+        for name in names:
+            axes.errorbar([1.0], [2.0], [0.5], fmt="s", color=drawing.COLOURS[1], label=name)
+        drawing.add_legend(canvas, axes)
+        canvas.draw_without_rendering()
+        canvases.append(canvas)
+
+    drawing.svg_image(draw, 3.0, style=drawing.FigureStyle(width))
+    (canvas,) = canvases
+    legend: Any
+    (legend,) = canvas.legends
+    assert n_columns == 1 or legend.get_window_extent().x1 <= canvas.bbox.x1
     assert [text.get_text() for text in legend.get_texts()] == names
-    assert legend._ncols == n_columns
+    assert len({round(text.get_window_extent().x0) for text in legend.get_texts()}) == n_columns
     for line in legend.get_lines():
         look = line.get_marker(), line.get_color(), line.get_linestyle()
         assert look == ("s", drawing.COLOURS[1], "None")
 
 
 def test_columns_of_a_forest_have_scales_of_their_own_and_one_legend() -> None:
-    other = POINT._replace(series="central", style=1, value=8.0, high=9.0)
-    rows = [("N = 5", [POINT, other])]
+    central = POINT._replace(series="central", style=1, value=8.0, high=9.0)
+    rows = [("N = 5", [POINT, central])]
     canvas = Figure()
     drawing.forest(canvas, {"P": rows, "contacts": [("N = 5", [POINT, POINT])]}, "Sizes")
     left, right = canvas.axes
@@ -130,7 +133,15 @@ def test_columns_of_a_forest_have_scales_of_their_own_and_one_legend() -> None:
     assert [text.get_text() for text in legend.get_texts()] == ["homing", "central"]
 
 
-def drawn_scale(values: list[float], thresholds: tuple[float, ...]) -> str:
+def assert_numbers_are_plain(axis: Any) -> None:
+    """Numbers are 1, 2, 5, 10, 20 and so on if an axis is logarithmic, and have no powers."""
+    assert axis.get_major_formatter()(20.0) == "20"
+    if axis.get_scale() == "log":
+        assert [*axis.get_major_locator()._subs] == [1.0, 2.0, 5.0]
+        assert axis.get_minorticklocs().size == 0
+
+
+def scale_of(values: list[float], thresholds: tuple[float, ...]) -> str:
     points = tuple(
         Point("homing", 0, f"N = {value:g}", value, value - 1.0, value + 1.0) for value in values
     )
@@ -141,13 +152,10 @@ def drawn_scale(values: list[float], thresholds: tuple[float, ...]) -> str:
     assert low <= min(values) <= max(values) < high
     transform = axes.yaxis.get_transform()
     assert getattr(transform, "linthresh", 1.0) == 1.0  # between -1 and 1 it is linear
-    shown = {f"{tick:g}" for tick in axes.get_yticks() if low <= tick <= high}
-    if axes.get_yscale() == "log":
-        digits = {text.strip("0.") for text in shown}
-        assert digits == {"1", "2", "5"}
-        assert shown <= {label.get_text() for label in axes.get_yticklabels()}
-        assert axes.get_yticks(minor=True).size == 0
-    return axes.get_yscale()
+    scale = axes.get_yscale()
+    if scale != "linear":
+        assert_numbers_are_plain(axes.yaxis)
+    return scale
 
 
 @pytest.mark.parametrize(
@@ -164,7 +172,7 @@ def drawn_scale(values: list[float], thresholds: tuple[float, ...]) -> str:
 def test_a_value_far_from_all_others_leaves_them_apart(
     values: list[float], thresholds: tuple[float, ...], scale: str
 ) -> None:
-    assert drawn_scale(values, thresholds) == scale
+    assert scale_of(values, thresholds) == scale
 
 
 def test_a_run_of_0_has_its_dot_where_the_others_are_far_apart() -> None:
@@ -211,20 +219,23 @@ def places_of(axes: Any) -> list[Any]:
 def test_series_stand_beside_each_other_with_what_was_published_and_where_p_is_capped() -> None:
     second = POINT._replace(series="central", style=1, value=2.0, low=None, high=None)
     points = (
-        *(POINT._replace(published=5.0, saturated=True, link="question-7"), second),
+        POINT._replace(published=5.0, saturated=True, link="question-7"),
+        second,
         POINT._replace(category="N = 10", decided=False),
     )
     canvas = Figure(figsize=(drawing.WIDTH, 3.0))
     panels = [Panel("One", "R", points, (0.0, 1.0), "N"), Panel("Two", "S", points[:1], (), "M")]
     drawing.intervals(canvas, panels)
+    names = [text.get_text() for text in canvas.legends[0].get_texts()]
+    assert names == ["homing", "central"]
     all_axes: list[Any] = [*canvas.axes]
     first, last = all_axes
     assert (first.get_title(), first.get_ylabel(), first.get_xlabel()) == ("One", "R", "N")
     assert (last.get_title(), last.get_ylabel(), last.get_xlabel()) == ("Two", "S", "M")
     assert places_of(first)[:4] == [
-        *(("None", [[0.0, at], [1.0, at]]) for at in (0.0, 1.0)),
-        *(("x", [[-0.02, 5.0]]), ("o", [[-0.12, 4.0]])),
-    ]
+        ("None", [[0.0, 0.0], [1.0, 0.0]]), ("None", [[0.0, 1.0], [1.0, 1.0]]),
+        ("x", [[-0.02, 5.0]]), ("o", [[-0.12, 4.0]]),
+    ]  # fmt: skip
     marks = [(mark, *place) for mark, (place, *_) in places_of(first) if mark in ("o", "s")]
     assert marks == [("o", -0.12, 4.0), ("s", 0.12, 2.0), ("o", 0.88, 4.0)]
     fills = [line.get_markerfacecolor() for line in first.lines if line.get_marker() in ("o", "s")]
@@ -241,13 +252,11 @@ def test_series_stand_beside_each_other_with_what_was_published_and_where_p_is_c
     assert [len(axes.lines[0].get_xydata()) for axes in (first, last)] == [2, 1]
 
 
-@pytest.mark.parametrize(
-    ("series", "title", "shown"), [("homing", "", "homing"), ("homing", "R", "R")]
-)
-def test_a_single_series_stands_in_the_title(series: str, title: str, shown: str) -> None:
+@pytest.mark.parametrize(("title", "heading"), [("", "homing"), ("R", "R")])
+def test_a_single_series_stands_in_the_title(title: str, heading: str) -> None:
     canvas = Figure()
-    drawing.intervals(canvas, [Panel(title, "", (POINT._replace(series=series),), (), "")])
-    assert canvas.axes[0].get_title() == shown
+    drawing.intervals(canvas, [Panel(title, "", (POINT,), (), "")])
+    assert canvas.axes[0].get_title() == heading
     assert canvas.legends == []
 
 
@@ -285,8 +294,7 @@ def test_rows_of_a_forest_have_headings_thresholds_and_far_values() -> None:
     assert axes.get_xlim() == pytest.approx((1.5 * low, 1.5 * high))
     transform = axes.xaxis.get_transform()
     assert (axes.get_xscale(), transform.linthresh) == ("symlog", 1.0)
-    canvas.draw_without_rendering()
-    assert {"0", "1", "10"} <= {label.get_text() for label in axes.get_xticklabels()}
+    assert_numbers_are_plain(axes.xaxis)
 
 
 def test_factors_lie_on_a_logarithmic_axis_about_1() -> None:
@@ -295,11 +303,7 @@ def test_factors_lie_on_a_logarithmic_axis_about_1() -> None:
     drawing.forest(canvas, {"times": [("N = 5", [point])]}, is_of_times=True)
     axes: Any = canvas.axes[0]
     assert (axes.get_xscale(), axes.get_xlim()) == ("log", pytest.approx(times_limits([point])))
-    in_view = [tick for tick in axes.get_xticks() if 0.25 / 1.15 <= tick <= 5.0 * 1.15]
-    assert in_view == pytest.approx([0.5, 1.0, 2.0, 5.0])
-    canvas.draw_without_rendering()
-    assert {"0.5", "1", "2", "5"} <= {label.get_text() for label in axes.get_xticklabels()}
-    assert axes.get_xticks(minor=True).size == 0
+    assert_numbers_are_plain(axes.xaxis)
     assert ("None", [[1.0, 0.0], [1.0, 1.0]]) in places_of(axes)
     assert (">", [[5.75, 0.0]]) in places_of(axes)
     assert len(axes.collections) == 1
@@ -321,7 +325,8 @@ def test_factors_lie_on_a_logarithmic_axis_about_1() -> None:
             ("93.6pt", "88.2pt"),
             [
                 "Bars: 95\N{NO-BREAK SPACE}% word word word word word word",
-                *("word word word word word word word word", "word word word end."),
+                "word word word word word word word word",
+                "word word word end.",
             ],
         ),
     ],

@@ -10,7 +10,7 @@ from swarm_logistics_env.study import Study
 from swarm_logistics_env.study.report.answer import Answer, answer
 from swarm_logistics_env.study.report.inline_forest import Group, groups_of
 from swarm_logistics_env.study.report.points import Point
-from tests.made_up import delivered, judged
+from tests.made_up import P_BY_SEED, delivered, judged
 
 POINT = Point("", 0, "", 0.5, 0.0, 1.0, 0.25, decided=True, link="question-7")
 FAR = POINT._replace(value=99.0, low=-0.5, high=None)
@@ -24,31 +24,30 @@ TIMES = ["0.5 5.41", "1 32.26", "2 59.10", "5 94.59"]
 
 
 @pytest.fixture(scope="module")
-def whole() -> Answer:
+def all_questions() -> Answer:
     study = Study(
         policies=["homing", "swarm-dt"], seeds=4, sizes=[{"values": [5, 10, 20]}], indicators=["S"],
         compares_policies=True,
     )  # fmt: skip
-    p_of = {"homing": [6, 7, 9, 11], "swarm-dt": [8, 11, 12, 10]}
     return answer(
-        judged(study, lambda name, at, seed: delivered(at.value * p_of[name][seed] - seed))
+        judged(study, lambda policy, at, seed: delivered(at.value * P_BY_SEED[policy][seed] - seed))
     )
 
 
-def groups(whole: Answer, subject: str, points: list[Point]) -> tuple[Group, ...]:
+def groups(all_questions: Answer, subject: str, points: list[Point]) -> tuple[Group, ...]:
     """Return the groups of the first questions of a policy, with these values."""
-    lines = [line for line in whole.lines if line.subject == subject]
-    return groups_of(whole._replace(lines=tuple(lines[: len(points)])), points)
+    lines = [line for line in all_questions.lines if line.subject == subject]
+    return groups_of(all_questions._replace(lines=tuple(lines[: len(points)])), points)
 
 
-def test_questions_stand_in_groups_by_policy_and_indicator(whole: Answer) -> None:
-    parts = groups_of(whole, [POINT] * len(whole.lines))
+def test_questions_stand_in_groups_by_policy_and_indicator(all_questions: Answer) -> None:
+    parts = groups_of(all_questions, [POINT] * len(all_questions.lines))
     assert [(part.heading, [row.name for row in part.rows]) for part in parts] == [
         ("homing against swarm-dt: times P", ["N = 5", "N = 10", "N = 20"]),
         ("homing: Scalability S", ["N 5→10", "N 10→20"]),
         ("swarm-dt: Scalability S", ["N 5→10", "N 10→20"]),
     ]
-    assert [row.line for part in parts for row in part.rows] == [*whole.lines]
+    assert [row.line for part in parts for row in part.rows] == [*all_questions.lines]
 
 
 @pytest.mark.parametrize(
@@ -61,9 +60,9 @@ def test_questions_stand_in_groups_by_policy_and_indicator(whole: Answer) -> Non
     ],
 )
 def test_the_axis_has_numbers_at_which_lines_cross_the_rows(
-    subject: str, points: list[Point], numbers: list[str], middle: str, whole: Answer
+    subject: str, points: list[Point], numbers: list[str], middle: str, all_questions: Answer
 ) -> None:
-    (group,) = groups(whole, subject, points)
+    (group,) = groups(all_questions, subject, points)
     places = [number.split()[1] for number in numbers]
     ticks = "".join(
         f'<line class="axis" x1="{x}%" x2="{x}%" y1="14" y2="18"/>'
@@ -79,15 +78,15 @@ def test_the_axis_has_numbers_at_which_lines_cross_the_rows(
         assert row.svg.startswith(f'<svg height="20" aria-hidden="true">{crossing}<')
 
 
-def mark_of(whole: Answer, subject: str, points: list[Point]) -> str:
+def mark_of(all_questions: Answer, subject: str, points: list[Point]) -> str:
     """Return what the last row shows of its value."""
-    (group,) = groups(whole, subject, points)
+    (group,) = groups(all_questions, subject, points)
     return re.sub(".*?(<g .*|</svg>)", r"\1", group.rows[-1].svg)
 
 
-def test_a_value_is_drawn_with_its_interval_threshold_and_question(whole: Answer) -> None:
-    assert mark_of(whole, "homing", [NOTHING]) == "</svg>"
-    assert mark_of(whole, "homing", [POINT]) == (
+def test_a_value_is_drawn_with_its_interval_threshold_and_question(all_questions: Answer) -> None:
+    assert mark_of(all_questions, "homing", [NOTHING]) == "</svg>"
+    assert mark_of(all_questions, "homing", [POINT]) == (
         '<g class="supported" data-question="7">'
         "<title>N 5 -&gt; 10: 1.038 [1.000, 1.075], supported, n &lt; 10</title>"
         '<line x1="5.36%" x2="94.64%" y1="10" y2="10"/>'
@@ -97,7 +96,7 @@ def test_a_value_is_drawn_with_its_interval_threshold_and_question(whole: Answer
         '<use href="#mark-o" x="50.00%" y="10"/></g></svg>'
     )
     # Half an interval is none.
-    assert mark_of(whole, "homing", [POINT, FAR]).endswith(
+    assert mark_of(all_questions, "homing", [POINT, FAR]).endswith(
         '</title><line class="threshold" x1="42.65%" x2="42.65%" y1="5.5" y2="14.5"/>'
         '<use href="#mark-o" x="99.47%" y="10"/></g></svg>'
     )
@@ -116,9 +115,9 @@ def test_a_value_is_drawn_with_its_interval_threshold_and_question(whole: Answer
     ],
 )
 def test_an_interval_that_leaves_the_axis_ends_in_arrows(
-    subject: str, verdict: str, title: str, x: str, whole: Answer
+    subject: str, verdict: str, title: str, x: str, all_questions: Answer
 ) -> None:
-    assert mark_of(whole, subject, [CUT]) == (
+    assert mark_of(all_questions, subject, [CUT]) == (
         f'<g class="{verdict}" data-question="7"><title>{title}</title>'
         '<line x1="0.00%" x2="100.00%" y1="10" y2="10"/>'
         '<use href="#arrow-left" x="0.00%" y="10"/><use href="#arrow-right" x="100.00%" y="10"/>'

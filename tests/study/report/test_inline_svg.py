@@ -11,11 +11,11 @@ SVG = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/19
 
 
 DOTS = '<use style="fill: #d55e00; stroke: red"/><use style="fill: #d55e00; stroke: red"/>'
-DOTS_SHOWN = '<use class="dot" data-seed="0" /><use class="dot" data-seed="12" />'
+DOTS_OF_PAGE = '<use class="dot" data-seed="0" /><use class="dot" data-seed="12" />'
 
 
 @pytest.mark.parametrize(
-    ("drawn", "shown"),
+    ("drawing", "part_of_page"),
     [
         # A style would hold for the whole page.
         ("><defs><style>* {}</style></defs><style/>", "><defs />"),
@@ -49,16 +49,11 @@ DOTS_SHOWN = '<use class="dot" data-seed="0" /><use class="dot" data-seed="12" /
         # Each dot names its seed, and all together have a colour.
         (
             f'><g id="condition-3-seeds-0-12"><g>{DOTS}</g></g>',
-            f'><g data-condition="3" style="fill: var(--p1)"><g>{DOTS_SHOWN}</g></g>',
+            f'><g data-condition="3" style="fill: var(--p1)"><g>{DOTS_OF_PAGE}</g></g>',
         ),
     ],
 )  # fmt: skip
-def test_a_drawing_becomes_a_part_of_the_page(drawn: str, shown: str) -> None:
+def test_a_drawing_becomes_a_part_of_the_page(drawing: str, part_of_page: str) -> None:
     size = 'width="9pt" height="8pt" version="1.1" viewBox="0 0 9.126 8"'
-    part = inline(SVG.format(f"{size}{drawn}"), "S", {"question-7": "R < 0"})
-    assert part == f'<svg viewBox="0 0 9.13 8" stroke-linejoin="round"{shown}</svg>'
-
-
-def test_a_dot_without_a_seed_is_an_error() -> None:
-    with pytest.raises(ValueError, match="zip"):
-        inline(SVG.format(f'><g id="condition-3-seeds-0">{DOTS}</g>'), "S", {})
+    svg = inline(SVG.format(f"{size}{drawing}"), "S", {"question-7": "R < 0"})
+    assert svg == f'<svg viewBox="0 0 9.13 8" stroke-linejoin="round"{part_of_page}</svg>'

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import matplotlib
 import numpy as np
+import pandas as pd
 import pytest
 
 from swarm_logistics_env import __version__
+from swarm_logistics_env import judge as judge_trials
 from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.report.document import document
 from swarm_logistics_env.study.report.drawing import svg_image
@@ -19,9 +22,9 @@ from swarm_logistics_env.study.report.page import html
 from swarm_logistics_env.study.report.write import markdown
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks.outcome import Outcome
-from swarm_logistics_env.study.verdicts.results import StudyResults
+from swarm_logistics_env.study.verdicts.results import StudyResults, judge
 from tests.conftest import Check, figures_drawn
-from tests.made_up import judged, paper
+from tests.made_up import delivered, judged, limited, paper
 
 RECORDED_WITH = "3.11.2"  # of matplotlib, whose versions draw otherwise
 
@@ -77,6 +80,29 @@ def collapsing(_: str, setting: Setting, seed: int) -> Outcome:
     return Outcome(delivery_times=np.arange(1.0 + seed % 2 if collapses else 2.0 * size + seed % 3))
 
 
+def of_trainings() -> StudyResults:
+    """Return a study of a policy that was trained seven times."""
+    plan = Study(policies=["ppo-robust@all"], seeds=3, sizes=[{"values": [4, 8]}]).plan()
+    outcomes = {}
+    for run in plan.runs:
+        n_robots = run.case.scenario.n_robots
+        rng = np.random.default_rng([run.seed, n_robots, *map(ord, run.case.policy.name)])
+        outcomes[run.case.key, run.seed] = delivered(rng.poisson(20) + 3 * n_robots)
+    return judge(plan, outcomes)
+
+
+def of_trials() -> StudyResults:
+    """Return trials of three policies."""
+    noise = {"a": (0, 3, 1, 4), "b": (2, 2, 0, 1), "c": (4, 0, 3, 3)}
+    rows = [
+        (policy, n_robots, 3 * n_robots + (number + n_robots) % 5)
+        for policy, numbers in noise.items()
+        for n_robots in (4, 8)
+        for number in numbers
+    ]
+    return judge_trials(pd.DataFrame(rows, columns=["policy", "robots", "P"]))
+
+
 def studies() -> Iterator[tuple[str, StudyResults]]:
     """Yield results by a name."""
     yield "paper, one seed", paper(seeds=1)
@@ -85,6 +111,11 @@ def studies() -> Iterator[tuple[str, StudyResults]]:
     yield "failures", judged(Study.preset("quick", seeds=4, policies=TWO), with_failures)
     yield "empty", judged(Study.preset("quick", seeds=6, policies=["homing"]), until_empty)
     yield "edge", judged(Study(**EDGE), collapsing)
+    yield "limited", limited()
+    damage = "3 rows are damaged"
+    yield "flagged", replace(limited(), exploratory=True, late_margin=True, damage=damage)
+    yield "trainings", of_trainings()
+    yield "trials", of_trials()
 
 
 @pytest.fixture(scope="module")
@@ -131,7 +162,10 @@ def test_reports_are_as_recorded(made_up: dict[str, StudyResults], check_recorde
         text = markdown(report)
         if name in ("day", "edge", "failures"):
             text += f"\n{latex_tables(report.paper)}"
+        if name in ("limited", "flagged", "trainings", "trials"):
+            text = re.sub(r"\n## Set-up.*?(?=\n## Methods)", "", text, flags=re.DOTALL)
         lines += [f"#### {name}", *filter(None, without_versions(text).splitlines())]
+        lines.append(f"figures: {', '.join(figure.name for figure in report.figures)}")
         lines.append(report.runs.note)
         for table, panel in report.runs.panels.items():
             means = [f"{p.series} {p.category} {p.value:.4g} {p.link}" for p in panel.points]

@@ -1,20 +1,28 @@
-"""Shards and the studies merged of them: each run once, and nothing but parts of one study."""
+"""Shards and the studies merged of them: each run once, parts of one study, and changes."""
 
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from swarm_logistics_env import judge
+from swarm_logistics_env import Scenario, judge
 from swarm_logistics_env.core.errors import StudyError
+from swarm_logistics_env.core.fingerprint import UNSTABLE
+from swarm_logistics_env.policies import PolicySpec
+from swarm_logistics_env.study.questions.plan import make_plan
+from swarm_logistics_env.study.questions.specification import Specification
 from swarm_logistics_env.study.runs.engines import Shard
-from swarm_logistics_env.study.runs.notes import StoredStudy, merge
+from swarm_logistics_env.study.runs.notes import StoredStudy, merge, note
 from swarm_logistics_env.study.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.study.studies import Study
-from tests.made_up import alter
+from swarm_logistics_env.study.tasks.outcome import Outcome
+from swarm_logistics_env.study.tasks.task import Case, Run
+from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
+from tests.made_up import alter, delivered
 
 
 def test_every_run_is_in_one_shard() -> None:
@@ -94,3 +102,51 @@ def test_recorded_trials_are_not_merged(full: Path, tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="lab was imported: only studies that were run are merg"):
         merge([full, tmp_path / "lab"], tmp_path / "both")
     assert not (tmp_path / "both" / FILE_NAME).exists()
+
+
+def test_another_result_of_a_run_is_no_part_of_the_same_study(tmp_path: Path) -> None:
+    case = Case(PolicySpec(name="swarm-dt"), "identity", Scenario(), task=WAREHOUSE)
+    run = Run(case, "code", 7)
+    for name, outcome in (("a", delivered(2)), ("b", delivered(3)), ("failed", Outcome(error="x"))):
+        with Runs(tmp_path / name) as store:
+            store.add([(run, outcome)])
+    with Runs(tmp_path / "a") as store, Runs(tmp_path / "b") as another:
+        store.absorb(store)
+        with pytest.raises(StudyError) as refused:
+            store.absorb(another)
+        assert str(refused.value) == (
+            f"{tmp_path / 'b'} has another result than the stores before it for the run {run.key} "
+            "(seed 7), of the same scenario, policy and code"
+        )
+        with Runs(tmp_path / "failed") as failed:
+            store.absorb(failed)
+            assert store.succeeded() == {run.key}
+            failed.absorb(another)
+            assert failed.outcomes([run])[case.key, 7].delivered == 3
+
+
+def test_what_changed_since_the_runs_were_stored_is_told(tmp_path: Path) -> None:
+    fields: dict[str, Any] = {"seeds": 2, "sizes": [{"values": [2, 3]}]}
+    specification = Specification(**fields)
+    plan = make_plan(specification, code="new", identities={"policy swarm-dt": "now"})
+    with Runs(tmp_path / FILE_NAME) as store:
+        assert StoredStudy.of(store) is None
+        note(store, plan, Study(seeds=2)._declared(store))
+        noted = StoredStudy.of(store)
+    assert noted is not None
+    assert [*noted.changes(plan)] == []
+    assert [*noted.changes(replace(plan, code="newer"))] == [
+        "the code of the task warehouse changed"
+    ]
+    unstable = replace(plan, identities={"policy swarm-dt": f"{UNSTABLE} 1"})
+    assert [*noted.changes(unstable)] == [
+        "policy swarm-dt is another one each time it is made; an `identity` would name it"
+    ]
+    assert noted.specification.differing(specification) == []
+    further: tuple[tuple[dict[str, Any], list[str]], ...] = (
+        ({"seeds": 3, "margin": 0.2, "first_seed": 9, "until_clear": True}, []),
+        ({"name": "mine", "sizes": [{"values": [2, 4]}]}, ["name", "sizes"]),
+        ({"task": "clearing"}, ["task"]),
+    )
+    for others, differing in further:
+        assert noted.specification.differing(Specification(**{**fields, **others})) == differing

@@ -35,6 +35,7 @@ from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.study.trials import read_trials
 from swarm_logistics_env.views.cli import app
 from swarm_logistics_env.views.cli.terminal import say_what_was_played
+from tests.made_up import delivered
 
 CASE = Case(PolicySpec(name="swarm-dt", label="mine"), "identity", Scenario(), task=WAREHOUSE)
 
@@ -74,8 +75,11 @@ def test_csv_says_what_the_store_holds_sorted_and_without_wall_times(
     with Runs.existing(played) as runs:
         frame = runs.frame()
         (count, digest), again = (export(runs, tmp_path / f"{n}.csv") for n in range(2))
-        for name in ("rows.xlsx", "nowhere/rows.csv"):
-            with pytest.raises(StudyError, match=r"cannot (export to|write)"):
+        for name, words in (
+            ("rows.xlsx", r"cannot export to .*rows\.xlsx: should end in \.csv$"),
+            ("nowhere/rows.csv", "cannot write"),
+        ):
+            with pytest.raises(StudyError, match=words):
                 export(runs, tmp_path / name)
     assert (count, digest) == (len(frame), again[1])
     text = pd.read_csv(tmp_path / "0.csv")
@@ -140,16 +144,19 @@ def test_what_is_no_store_is_refused_with_the_reason(
     assert path.read_bytes() == before
 
 
-def test_what_was_discarded_is_damage_no_more(tmp_path: Path) -> None:
-    path = tmp_path / FILE_NAME
-    with Runs(path) as runs:
-        runs.add([(run(0), outcome(1.0)), (run(1), outcome(2.0))])
-    with closing(sqlite3.connect(path)) as database, database:
-        database.execute("UPDATE runs SET outcome = '{}' WHERE key = ?", (run(0).key,))
-    with Runs(path) as runs:
-        assert "1 run of" in (runs.damage() or "")
-        assert "1 run of" in (runs.discard_damaged() or "")
-        assert (runs.damage(), runs.succeeded()) == (None, {run(1).key})
+def test_of_the_runs_of_a_store_those_whose_keys_are_given_are_shown(tmp_path: Path) -> None:
+    all_runs = [run(seed) for seed in range(3)]
+    first, second, third = sorted(run.key for run in all_runs)
+    with Runs(None) as runs:
+        assert export(runs, tmp_path / "none.csv")[0] == 0
+        runs.add((run, delivered(run.seed, ended_at=60.0)) for run in all_runs)
+        rows = runs.frame()
+        assert rows["run"].tolist() == [first, second, third]
+        assert runs.frame([third, first, "nobody"])["run"].tolist() == [first, third]
+        assert len(runs.frame([])) == 0
+    assert rows["policy_identity"].tolist() == ["identity"] * 3
+    by_seed = rows.sort_values("seed")
+    assert by_seed["longest_standstill"].tolist() == [60.0, 60.0, 59.0]
 
 
 def test_store_keeps_outcomes_exactly_and_reading_leaves_it_as_it_is(tmp_path: Path) -> None:

@@ -6,16 +6,16 @@ import faulthandler
 import pickle
 import signal
 import threading
-from collections.abc import Iterator
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, TextIO
 
 import pytest
 
 from swarm_logistics_env import Scenario
+from swarm_logistics_env.compiler.numba_fence import QUIET
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.study.runs import worker_processes
 from swarm_logistics_env.study.runs.worker_processes import in_processes
@@ -37,7 +37,7 @@ class Pool:
     def __init__(self, endings: dict[int, list[str]]) -> None:
         self.endings = endings
 
-    def submit(self, play: object, message: bytes, modules: object, watch: Any) -> Future[Outcome]:
+    def submit(self, play: Any, message: bytes, modules: object, watch: Any) -> Future[Outcome]:
         run: Run = pickle.loads(message)
         ending = self.endings[run.seed].pop(0)
         future = Future[Outcome]()
@@ -45,7 +45,10 @@ class Pool:
             raise BrokenProcessPool
         if ending == "hangs":
             (watch.reports / run.key).write_text(REPORT)
-        if ending == "done":
+        if ending == "plays":
+            future.set_result(play(message, None, watch))
+            assert not any(watch.reports.iterdir())
+        elif ending == "done":
             future.set_result(Outcome(ended_at=float(run.seed)))
         else:
             future.set_exception(BrokenProcessPool())
@@ -66,12 +69,11 @@ def test_a_run_whose_worker_died_is_played_once_more_alone_unless_it_took_too_lo
     endings: list[str], error: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pool = Pool({0: ["done"], 1: [*endings], 2: ["done"], 3: ["done"]})
-    sizes = []
+    sizes: list[int] = []
 
-    @contextmanager
-    def workers(count: int) -> Iterator[Pool]:
+    def workers(count: int) -> nullcontext[Pool]:
         sizes.append(count)
-        yield pool
+        return nullcontext(pool)
 
     monkeypatch.setattr(worker_processes, "workers", workers)
     runs = [Run(CASE, "code", seed) for seed in range(4)]
@@ -102,18 +104,18 @@ def test_only_the_main_thread_has_workers_ignore_ctrl_c() -> None:
 
 
 def test_a_worker_ends_in_a_run_that_takes_too_long_and_leaves_no_report_of_others(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    run = Run(CASE, "old code", 0)
     calls: list[object] = []
 
     def begin(limit: float, *, exit: bool, file: TextIO) -> None:
-        calls.append((limit, exit, file.name))
+        calls.append((limit, exit, Path(file.name).name))
 
     monkeypatch.setattr(faulthandler, "dump_traceback_later", begin)
     monkeypatch.setattr(faulthandler, "cancel_dump_traceback_later", lambda: calls.append("ends"))
-    watch, run = worker_processes._Watch(3.0, tmp_path), Run(CASE, "code", 0)
-    with watch.over(run):
-        assert (tmp_path / run.key).exists()
-    assert calls == [(3.0, True, str(tmp_path / run.key)), "ends"]
-    assert not any(tmp_path.iterdir())
-    assert watch.error(run) is None
+    monkeypatch.setattr(worker_processes, "workers", lambda _: nullcontext(Pool({0: ["plays"]})))
+    monkeypatch.setenv(QUIET, "1")  # which a worker sets
+    ((_, outcome),) = in_processes(1, 3.0, [run])
+    assert "the package changed while the study ran" in str(outcome.error)
+    assert calls == [(3.0, True, run.key), "ends"]

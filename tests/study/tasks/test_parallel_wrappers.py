@@ -5,7 +5,7 @@ from __future__ import annotations
 import doctest
 import importlib
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any
 
@@ -31,18 +31,20 @@ class Spy(Lane):
     """Remembers the actions that reach it."""
 
     def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:
-        self.seen = getattr(self, "seen", [])
-        self.seen.append(list(actions.values()))
+        self.actions = getattr(self, "actions", [])
+        self.actions.append(list(actions.values()))
         return super().step(actions)
 
 
-def played(mode: str, seed: int = 3, **fields: Any) -> tuple[list[list[int]], list[Any], int]:
+def play_ten_steps(
+    mode: str, seed: int = 3, **fields: Any
+) -> tuple[list[list[int]], list[Any], int]:
     """Play ten steps of distinct actions; return what was executed and observed, and who failed."""
     env = FailingRobots(Spy(3), [RobotFault(mode=mode, robots=1, **fields)], FAILURES)
-    seen = [env.reset(seed=seed)[0]]
-    seen += [env.step(dict.fromkeys(env.agents, step % 2))[0] for step in range(10)]
+    observations = [env.reset(seed=seed)[0]]
+    observations += [env.step(dict.fromkeys(env.agents, step % 2))[0] for step in range(10)]
     (row,) = failing_rows(seed, 3, 1)
-    return env.unwrapped.seen, seen, row
+    return env.unwrapped.actions, observations, row
 
 
 def test_faults_of_one_seed_are_nested_and_differ_between_seeds() -> None:
@@ -64,21 +66,21 @@ LATE: dict[str, Any] = {"onset": 2.0, "duration": 3.0}
     ],
 )
 def test_silent_and_frozen_robots(mode: str, fields: dict[str, Any], expected: list[int]) -> None:
-    executed, _, row = played(mode, **fields)
-    assert [actions[row] for actions in executed] == expected
-    assert [actions[row - 1] for actions in executed] == [step % 2 for step in range(10)]
+    steps, _, row = play_ten_steps(mode, **fields)
+    assert [actions[row] for actions in steps] == expected
+    assert [actions[row - 1] for actions in steps] == [step % 2 for step in range(10)]
 
 
 def test_blind_and_noisy_robots() -> None:
-    _, seen, row = played("blind", **LATE)
-    me, other = f"robot_{row}", f"robot_{(row + 1) % 3}"
-    assert [not seen[t][me].any() for t in range(11)] == [False] * 2 + [True] * 3 + [False] * 6
-    (_, noisy, _), (_, again, _) = played("noisy"), played("noisy")
+    _, blind, row = play_ten_steps("blind", **LATE)
+    faulty, sound = f"robot_{row}", f"robot_{(row + 1) % 3}"
+    assert [not rows[faulty].any() for rows in blind] == [False] * 2 + [True] * 3 + [False] * 6
+    (_, noisy, _), (_, noisy_again, _) = play_ten_steps("noisy"), play_ten_steps("noisy")
     for t in range(11):
-        assert (noisy[t][other] == seen[t][other]).all()
-        assert (noisy[t][me] == again[t][me]).all()
-    assert noisy[0][me].dtype == np.float32
-    lengths = [noisy[t][me][1] for t in range(11)]
+        assert (noisy[t][sound] == blind[t][sound]).all()
+        assert (noisy[t][faulty] == noisy_again[t][faulty]).all()
+    assert noisy[0][faulty].dtype == np.float32
+    lengths = [noisy[t][faulty][1] for t in range(11)]
     assert np.mean(lengths) == pytest.approx(6.0, abs=0.6)
     assert 0.2 < np.std(lengths) < 1.0
     env = FailingRobots(Lane(3), [RobotFault(mode="noisy", robots=3)], FAILURES)
@@ -96,25 +98,26 @@ def test_without_a_seed_an_episode_has_the_next_one_the_first_seed_0() -> None:
         assert blind == [*failing_rows(expected, 9, 1)]
 
 
-class Asked(Lane):
-    """Keeps what it was asked to begin with."""
+class Remembers(Lane):
+    """Keeps the arguments of its last reset."""
 
     def reset(self, seed: int | None = None, options: Any = None) -> Any:
-        self.asked = seed, options
+        self.arguments = seed, options
         return super().reset(seed, options)
 
 
 @pytest.mark.parametrize(
-    "wrapped",
+    "make",
     [
-        PaddedAgents(Asked(2)),
-        FailingRobots(Asked(2), [], FAILURES),
-        ChangingAgents(Asked, [2]),
+        lambda: PaddedAgents(Remembers(2)),
+        lambda: FailingRobots(Remembers(2), [], FAILURES),
+        lambda: ChangingAgents(Remembers, [2]),
     ],
 )
-def test_seed_and_options_reach_the_environment(wrapped: Any) -> None:
-    observations, infos = wrapped.reset(seed=3, options={"goal": 1})
-    assert wrapped.unwrapped.asked == (3, {"goal": 1})
+def test_seed_and_options_reach_the_environment(make: Callable[[], Any]) -> None:
+    env = make()
+    observations, infos = env.reset(seed=3, options={"goal": 1})
+    assert env.unwrapped.arguments == (3, {"goal": 1})
     assert [*observations] == [*infos] == ["robot_0", "robot_1"]
 
 
@@ -174,8 +177,8 @@ def test_each_passes_pettingzoos_test_on_environments_that_are_not_ours(make_the
     idle = make_theirs(3).action_space(make_theirs(3).possible_agents[0]).sample()
     faults = [RobotFault(mode=mode, robots=1, onset=3.0) for mode in ("silent", "blind")]
     failures = {"silent": idle, "blind": None}
-    for changing in (make_theirs(3), ChangingAgents(make_theirs, [2, 3])):
-        test(PaddedAgents(FailingRobots(changing, faults, failures)), num_cycles=100)
+    for env in (make_theirs(3), ChangingAgents(make_theirs, [2, 3])):
+        test(PaddedAgents(FailingRobots(env, faults, failures)), num_cycles=100)
     test(FailingRobots(make_theirs(3), faults, failures), num_cycles=100)
 
 
@@ -189,12 +192,13 @@ class Leaving(Lane):
     def step(self, actions: dict[str, Any]) -> Any:
         acting, self.steps = list(self.agents), self.steps + 1
         assert list(actions) == acting
-        seen, _, *_ = super().step({"robot_0": STAY, **actions})
-        gone = {agent: self.steps == 2 and agent == "robot_0" for agent in acting}
-        over = dict.fromkeys(acting, self.steps == 4)
-        self.agents = [agent for agent in acting if not (gone[agent] or over[agent])]
+        rows, *_ = super().step({"robot_0": STAY, **actions})
+        leaves = {agent: self.steps == 2 and agent == "robot_0" for agent in acting}
+        time_is_up = dict.fromkeys(acting, self.steps == 4)
+        self.agents = [agent for agent in acting if not (leaves[agent] or time_is_up[agent])]
         infos = {agent: {"steps": self.steps} for agent in acting}
-        return {a: seen[a] for a in acting}, dict.fromkeys(acting, 1.0), gone, over, infos
+        rewards = dict.fromkeys(acting, 1.0)
+        return {a: rows[a] for a in acting}, rewards, leaves, time_is_up, infos
 
 
 def test_agents_are_padded_and_masked_until_all_end_together() -> None:
@@ -202,39 +206,39 @@ def test_agents_are_padded_and_masked_until_all_end_together() -> None:
     agents = env.possible_agents
     _, infos = env.reset(seed=0)
     assert [infos[agent]["active"] for agent in agents] == [1, 1, 1]
-    masks, paid, ends = [], [], []
+    masks, reward_rows, ends = [], [], []
     while env.agents:
-        seen, rewards, *over, infos = env.step(dict.fromkeys(agents, WALK))
+        rows, rewards, *ends_of_agents, infos = env.step(dict.fromkeys(agents, WALK))
         masks.append([infos[agent].pop("active") for agent in agents])
-        assert [bool(seen[agent].any()) for agent in agents] == [bool(m) for m in masks[-1]]
-        assert [(row.shape, row.dtype) for row in seen.values()] == [((2,), np.float32)] * 3
-        paid.append(list(rewards.values()))
-        ends.append([set(each.values()) for each in over])
+        assert [bool(rows[agent].any()) for agent in agents] == [bool(m) for m in masks[-1]]
+        assert [(row.shape, row.dtype) for row in rows.values()] == [((2,), np.float32)] * 3
+        reward_rows.append(list(rewards.values()))
+        ends.append([set(by_agent.values()) for by_agent in ends_of_agents])
     assert masks == [[1, 1, 1], [0, 1, 1], [0, 1, 1], [0, 1, 1]]
-    assert paid == [[1, 1, 1], [1, 1, 1], [0, 1, 1], [0, 1, 1]]
+    assert reward_rows == [[1, 1, 1], [1, 1, 1], [0, 1, 1], [0, 1, 1]]
     assert ends == [[{False}, {False}]] * 3 + [[{False}, {True}]]
     assert list(infos.values()) == [{}, {"steps": 4}, {"steps": 4}]
 
 
 def test_the_number_of_agents_is_drawn_for_each_episode() -> None:
-    env, again = (ChangingAgents(Lane, [2, 2, 5]) for _ in range(2))
+    env, same_env = (ChangingAgents(Lane, [2, 2, 5]) for _ in range(2))
     assert env.possible_agents == [f"robot_{row}" for row in range(5)]
     sizes = [len(env.reset(seed=seed)[0]) for seed in range(60)]
     assert set(sizes) == {2, 5}
     assert 30 < sizes.count(2) < 50
-    again.reset(seed=59)
-    for seen, seen_again in [[each.reset()[0] for each in (env, again)] for _ in range(5)]:
-        assert {a: v.tolist() for a, v in seen.items()} == {
-            a: v.tolist() for a, v in seen_again.items()
+    same_env.reset(seed=59)
+    for rows, same_rows in [(env.reset()[0], same_env.reset()[0]) for _ in range(5)]:
+        assert {a: v.tolist() for a, v in rows.items()} == {
+            a: v.tolist() for a, v in same_rows.items()
         }
-    first_seeds = set()
-    for asked in (ChangingAgents(Asked, [2]) for _ in range(9)):
-        asked.reset()
-        first_seeds.add(asked.unwrapped.asked[0])
-    assert len(first_seeds) > 4
+    unseeded = [ChangingAgents(Remembers, [2]) for _ in range(9)]
+    for changing in unseeded:
+        changing.reset()
+    assert len({changing.unwrapped.arguments[0] for changing in unseeded}) > 4
+    last = unseeded[-1]
     for seed, expected in ((3, 3), (None, 4), (None, 5), (0, 0), (None, 1)):
-        asked.reset(seed=seed)
-        assert asked.unwrapped.asked == (expected, None)
+        last.reset(seed=seed)
+        assert last.unwrapped.arguments == (expected, None)
     with pytest.raises(SetupError, match="should be one number of agents or more"):
         ChangingAgents(Lane, [])
     with pytest.raises(SetupError, match=r"make_env\(1\) has robot_0: should be"):

@@ -48,6 +48,19 @@ def test_a_data_frame_is_read_as_the_file_that_it_would_be(tmp_path: Path) -> No
         read_trials(FRAME.replace({"boxes": {8.0: np.nan}}), columns=COLUMNS)
 
 
+def test_names_of_a_data_frame_may_have_levels_and_cells_several_lines() -> None:
+    names = pd.MultiIndex.from_tuples([("robots", ""), ("P", "boxes"), (" policy", "")])
+    frame = pd.DataFrame([[4, 1.0, "a\n b"], [8, 2.5, "a b"]], columns=names)
+    columns = {"performance": "P boxes", "policy": " policy"}
+    trials = read_trials(frame, columns=columns)
+    assert [(row.n_robots, row.performance, row.policy) for row in trials.rows] == [
+        (4, 1.0, "a b"), (8, 2.5, "a b"),
+    ]  # fmt: skip
+    assert (trials.file, len(trials.digest)) == ("data frame", 16)
+    changed = frame.replace({2.5: 2.25})
+    assert read_trials(changed, columns=columns).digest != trials.digest
+
+
 def test_a_data_frame_is_judged_in_one_call(tmp_path: Path) -> None:
     frame = pd.concat([FRAME.assign(boxes=FRAME["boxes"] + step) for step in range(4)])
     in_memory = judge(frame, columns=COLUMNS)
@@ -83,15 +96,24 @@ def test_a_file_that_is_not_what_its_name_says_is_refused(
     workbook_bytes = (tmp_path / "real.xlsx").read_bytes()
     parquet_bytes = (tmp_path / "real.parquet").read_bytes()
     for name, content, words in (
-        ("a.csv", workbook_bytes, "is no text but a workbook or an archive"),
+        ("a.csv", workbook_bytes, r"or an archive: should end in \.xlsx, or be unpacked$"),
+        ("b.csv", b"\x1f\x8b\x08", r"b\.csv is .*packed by gzip: should be unpacked$"),
+        ("c.csv", parquet_bytes, r"a table in Parquet: should end in \.parquet$"),
+        (
+            "d.csv",
+            b"\xd0\xcf\x11\xe0",
+            r"of before 2007: should be saved as \.xlsx or CSV$",
+        ),
+        ("e.csv", b"\x89HDF", "a file of HDF5: should be saved as CSV$"),
         ("a.xlsx", b"N,P\n4,1\n", "is no workbook by its content"),
         ("a.parquet", b"N,P\n4,1\n", "is no table in Parquet by its content"),
         ("b.xlsx", workbook_bytes[:900], "is a damaged workbook"),
         ("b.parquet", parquet_bytes[:-9], "is a damaged table in Parquet"),
         ("a.json", b"N,P\n4,1\n", "is no JSON"),
         ("b.json", b"[1, 2]", "should be results as POGEMA writes them"),
+        ("d.json", b"3", "should be results as POGEMA writes them"),
+        ("e.json", b"{", "is no JSON: Expecting property name enclosed in double quotes"),
         ("c.json", b"[" * 50_000, "c.json is nested too deep"),
-        ("b.csv", b"\x1f\x8b\x08", "packed by gzip: should be unpacked"),
     ):
         path = tmp_path / name
         path.write_bytes(content)

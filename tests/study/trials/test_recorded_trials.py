@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,31 @@ ROWS = "8,none,0,20\n8,none,0,22\n8,jam,1,14\n8,jam,1,15\n8,removed,1,17\n8,remo
 LIMIT = "robots,fault,faulty,time to finish,finished\n"
 WIDE = "seed,none [boxes],jam 1 of 8 [boxes],removed 1 of 8 [boxes]\n1,20,14,17\n2,22,15,18\n"
 LOG = "trial,robots,duration,time\n1,4,60,5\n1,4,60,9.5\n2,4,60,\n3,4,60,59\n3,4,60,60\n"
+POGEMA: dict[str, Any] = {
+    "metrics": {"CSR": 0.5, "steps": [1, 2]},
+    "env_grid_search": {"num_agents": 8, "seed": 0},
+    "algorithm": "RHCR",
+}
+
+
+def pogema(**metrics: Any) -> tuple[str, dict[str, Any]]:
+    """Results of two planners with these metrics."""
+    results = [{**POGEMA, "metrics": metrics}, {**POGEMA, "algorithm": "A", "metrics": metrics}]
+    return json.dumps(results), {}
+
+
+def pogema_later(metric: object) -> tuple[str, dict[str, Any]]:
+    """Results of POGEMA, the second with this value of its metric."""
+    return json.dumps([POGEMA, {**POGEMA, "metrics": {"CSR": metric}}]), {}
+
+
+def marl_eval(**steps: Any) -> tuple[str, dict[str, Any]]:
+    """Runs of two algorithms with these steps."""
+    runs = {algorithm: {"seed_0": steps} for algorithm in ("ippo", "mappo")}
+    return json.dumps({"rware": {"small": runs}}), {}
+
+
+LATE = {"step_count": 9, "return": [3, 4]}
 # By a name: a text, and how it is read.
 TRIALS: dict[str, tuple[str, dict[str, Any]]] = {
     "plain": (HEAD + ROWS, {}),
@@ -162,15 +188,56 @@ TRIALS: dict[str, tuple[str, dict[str, Any]]] = {
     "Spanish": ("robots;fallo;averiados;entregas\n8;ninguno;0;20\n8;radio;1;14\n", {}),
     "upper case": ("ROBOTS,FAULT,FAULTY,P\n8,NONE,0,20\n8,Jam,1,14\n8,jam,1,15\n", {}),
     "rates": ("robots,throughput [1/min],duration\n4,0.5,60\n8,1,60\n", {}),
+    "metrics of no step": pogema(CSR=0.5, by_step=[1.0], by_agent={"a": 1}),
+    "metrics of a known name": pogema(speed=3, CSR=0.5, ISR=0.25),
+    "metrics of no known name": pogema(speed=3, way=4),
+    "a metric that is true": pogema_later(True),
+    "a metric that is nan": pogema_later(float("nan")),
+    "a metric that is a text": pogema_later("x" * 38),
+    "a metric that is a long text": pogema_later("x" * 39),
+    "a metric that is a table": pogema_later({"a": 1}),
+    "the last evaluation": marl_eval(b=LATE, a={"step_count": 8, "return": [1]}),
+    "an evaluation with its time": marl_eval(
+        b={"step_count": 9, "elapsed_time": 7, "return": 2, "win": 1}, note="x"
+    ),
+    "an evaluation by reward": marl_eval(b={"step_count": 9, "win": 0.5, "reward": 6}),
+    "an evaluation by its only metric": marl_eval(b={"step_count": 9, "win": 0.5}),
+    "absolute metrics": marl_eval(b=LATE, absolute_metrics={"return": [5, 7]}),
+    "no absolute metrics": marl_eval(b=LATE, absolute_metrics={}),
+    "evaluations without steps": marl_eval(b={"return": 4}, c={"step_count": 1, "return": 2}),
+    "a list of nothing": ("[]", {}),
+    "a result and none": (json.dumps([POGEMA, {}]), {}),
+    "too many names": (json.dumps({"a": {"b": {"c": {"d": {"e": {"return": 1}}}}}}), {}),
+    "a monitor": (
+        '#{"t_start": 1.0, "env_id": "Lane-v0"}\nr,l,t\n1.5,1,1\n2.5,2,2\n',
+        {"columns": {"robots": "4"}},
+    ),
+    "a monitor of nothing": (
+        '#{"t_start": 1.0}\nr,l,t,boxes\n1.5,1,1,1\n2.5,2,2,2\n',
+        {"columns": {"robots": "4"}},
+    ),
+    "a monitor of deliveries": (
+        '#{"t_start": 1.0, "env_id": null}\nr,l,t,width,delivered\n1.5,1,1,1,1\n2.5,2,2,2,2\n',
+        {"columns": {"robots": "4"}},
+    ),
+    "half a monitor": ("#{\nrobots,P\n4,1\n8,2\n", {}),
+    "no monitor but a remark": ("# in May\nrobots,P\n4,1\n8,2\n", {}),
+    "an empty monitor": ("#{}\n#\nrobots,P\n4,1\n8,2\n", {}),
+    "a value more below blank lines": ("\n# a\nrobots;P\n\n4;1;2\n", {}),
+    "a sign that is not seen": ("robots,P\r\n4,1\r\n4,\u200b1\r\n", {}),
+    "empty cells more and cells less": (
+        "fault,P,m\nnone,1,0,,\nnone,2\n,,\njam,3,1,\n",
+        {"columns": {"robots": "8"}},
+    ),
     "rounded": ("robots,P\n4,0.3333333\n8,0.6666667\n", {}),
 }
 
 
 def test_trials_are_read_as_recorded(tmp_path: Path, check_recorded: Check) -> None:
     lines = []
-    path = tmp_path / "trials.csv"
     for name, (text, reading) in TRIALS.items():
-        path.write_text(text, encoding="utf-8")
+        path = tmp_path / ("trials.json" if text[0] in "[{" else "trials.csv")
+        path.write_bytes(text.encode())
         lines.append(f"# {name}")
         try:
             trials = read_trials(path, **reading)

@@ -36,23 +36,24 @@ def test_runs_that_break_off_are_told_from_those_that_never_began() -> None:
             times = np.sort(rng.uniform(0.0, end, rng.poisson(rate * end)))
             rows += [(robots, run, time, 500.0) for time in times]
     frame = pd.DataFrame(rows, columns=["robots", "run", "time", "duration"])
-    named = judge(frame).collapses
-    assert [collapse.cell.words for collapse in named] == ["N = 4", "N = 8"]
-    for collapse in named:
+    conditions = judge(frame).collapses
+    assert [collapse.cell.words for collapse in conditions] == ["N = 4", "N = 8"]
+    for collapse in conditions:
         assert collapse.n_collapsed == 7
         np.testing.assert_allclose(collapse.breaks, 100.0, atol=20.0)
-    words = collapsed_in_words(named, names_policies=False)
+    words = collapsed_in_words(conditions, names_policies=False)
     assert "26 % [11, 46] (of these 3 of 7 in mid-run, after 9" in words
 
 
 def test_a_run_breaks_off_at_its_last_delivery_if_it_was_as_fast_as_others() -> None:
-    """Runs deliver in steps [s] from the first time on; two stop, and two are slow."""
+    """Runs deliver in steps [s] from the first time on; two stop, two are slow, one is late."""
     steady = [np.arange(5.0, 500.0, 500.0 / (95 + run)) for run in range(20)]
-    broken = [np.arange(4.0, 101.0, 4.0), np.arange(4.0, 61.0, 4.0)]
-    others = [np.arange(10.0, 500.0, 25.0), np.arange(20.0, 181.0, 20.0), np.arange(402, 500, 4)]
+    stopping = [np.arange(4.0, 101.0, 4.0), np.arange(4.0, 61.0, 4.0)]
+    slow = [np.arange(10.0, 500.0, 25.0), np.arange(20.0, 181.0, 20.0)]
+    late = [np.arange(402.0, 500.0, 4.0)]
     rows = [
         (robots, run, time, 500.0)
-        for run, times in enumerate([*steady, *broken, *others])
+        for run, times in enumerate([*steady, *stopping, *slow, *late])
         for robots in (4, 8)
         for time in times
     ]
@@ -89,8 +90,8 @@ def test_collapses_name_their_policies_where_there_are_several() -> None:
     p = np.repeat([*range(90, 110), 3, 4, 5, 6, 7], 2)
     frame = pd.DataFrame({"robots": [4, 8] * 25, "delivered": p})
     assert "Runs collapse at N = 4 in 20 % [7, 41]" in " ".join(answer(judge(frame)).notes)
-    both = pd.concat([frame.assign(policy=name) for name in ("A", "B")])
-    assert "uns collapse of A at N = 4 in 20 % [7, 41]" in " ".join(answer(judge(both)).notes)
+    policies = pd.concat([frame.assign(policy=name) for name in ("A", "B")])
+    assert "uns collapse of A at N = 4 in 20 % [7, 41]" in " ".join(answer(judge(policies)).notes)
 
 
 def test_shares_of_collapsed_runs_have_exact_intervals_by_size() -> None:
@@ -125,8 +126,8 @@ def test_the_critical_size_is_said_with_its_interval() -> None:
     (table,) = (t for t in further_tables(results) if "near the edge" in t.title)
     assert table.title == "data frame: how near the edge, Scalability"
     assert table.columns == (
-        *("N", "runs collapsed, 95 %", "S of all runs", "S of the runs that did not"),
-    )
+        "N", "runs collapsed, 95 %", "S of all runs", "S of the runs that did not",
+    )  # fmt: skip
     assert [" | ".join(row) for row in table.rows] == [
         "N = 10 | 0 % [0, 12] | – | –",
         "N = 14 | 0 % [0, 12] | 0.000 | 0.000",

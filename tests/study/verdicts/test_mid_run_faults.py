@@ -37,10 +37,10 @@ def measured(**fields: Any) -> Resilience:
 @pytest.mark.parametrize(
     ("end", "onset", "window"),
     [
-        *((2000.0, 600.0, 100.0), (400.0, 100.0, 100.0), (400.0, 103.0, 99.0)),
-        *((500.0, 350.0, 50.0), (500.0, 495.0, 2.0), (500.0, 499.0, 1.0 / 3.0)),
+        (2000.0, 600.0, 100.0), (400.0, 100.0, 100.0), (400.0, 103.0, 99.0), (500.0, 350.0, 50.0),
+        (500.0, 495.0, 2.0), (500.0, 499.0, 1.0 / 3.0),
     ],
-)
+)  # fmt: skip
 def test_a_window_is_100_s_or_a_third_of_what_is_left(
     end: float, onset: float, window: float
 ) -> None:
@@ -53,22 +53,30 @@ def test_deliveries_are_counted_in_windows_up_to_the_end_of_the_run() -> None:
     curves = measured().curves
     assert [curve.runs for curve in curves] == ["no fault", "removed", "fault"]
     for curve, counts in zip(curves, ([50, 34, 25], [25, 20, 17], [20, 17, 14])):
-        assert curve.seconds.tolist() == [*np.arange(100.0, END + 1.0, 5.0)]
+        assert curve.seconds.tolist() == [*range(100, 401, 5)]
         expected = spi.mean_interval(counts)
         first = curve.deliveries[0], curve.low[0], curve.high[0]
         assert first == pytest.approx(expected)
         assert curve.deliveries[-1] == pytest.approx(expected.value, abs=1.0)
-    late = [{"modes": ["dead"], "robots": [1], "onsets": [340.0]}]
-    for curve in measured(faults=late).curves:
-        assert curve.seconds.tolist() == [*np.arange(20.0, END + 1.0, 2.0)]
+
+
+@pytest.mark.parametrize(
+    ("end", "onset", "step", "last"),
+    [(44.0, 12.0, 1.1, 44.0), (903.0, 500.0, 5.0, 900.0), (20.0, 10.0, 0.3, 19.8)],
+)
+def test_no_window_ends_after_the_run(end: float, onset: float, step: float, last: float) -> None:
+    faults = [{"modes": ["dead"], "robots": [1], "onsets": [onset]}]
+    for curve in measured(scenario={"duration": end, "n_robots": 4}, faults=faults).curves:
+        assert np.diff(curve.seconds) == pytest.approx(step)
+        assert curve.seconds[-1] == last
 
 
 def test_a_fault_is_set_beside_the_whole_swarm_and_the_robots_removed() -> None:
     resilience = measured()
-    removed, whole = resilience.against_removed, resilience.against_whole
-    assert removed is not None
-    assert whole is not None
-    assert (removed.threshold, whole.threshold) == (1.0, 0.75)
+    against_removed, against_whole = resilience.against_removed, resilience.against_whole
+    assert against_removed is not None
+    assert against_whole is not None
+    assert (against_removed.threshold, against_whole.threshold) == (1.0, 0.75)
     n_after = [
         np.mean(
             [
@@ -78,7 +86,7 @@ def test_a_fault_is_set_beside_the_whole_swarm_and_the_robots_removed() -> None:
         )
         for name in ("dead", "removed", "none")
     ]
-    assert (removed.value, whole.value) == pytest.approx(
+    assert (against_removed.value, against_whole.value) == pytest.approx(
         (n_after[0] / n_after[1], n_after[0] / n_after[2])
     )
     assert resilience.problem is None

@@ -34,8 +34,8 @@ def test_a_search_that_is_stopped_says_where_it_is_kept(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def stop(what: Attack, engine: object, out: Path) -> None:
-        assert (what, str(out)) == (search, directory)
+    def stop(search_of_command: Attack, engine: object, out: Path) -> None:
+        assert (search_of_command, str(out)) == (search, directory)
         raise KeyboardInterrupt
 
     directory = "mine" if options else str(Path("results", "attack-homing"))

@@ -65,16 +65,16 @@ def test_study_run_prints_and_writes_the_report(file: Path, command: Command) ->
     # Nobody delivers in half a second: every ratio is undefined, and that is said.
     short = FILE.replace("duration = 2", "duration = 0.5")
     file.write_text(f"{short}\n[[faults]]\nmodes = ['FM1']\nrobots = [1]\n")
-    printed = command(f"{RUN} --out out --full")
+    output = command(f"{RUN} --out out --full")
     for words in (
         "3 questions; 4 conditions x 2 seeds = 8 runs",
         "Scalability",
         "Fault tolerance and robustness",
         "undefined: it delivers nothing",
     ):
-        assert words in printed
+        assert words in output
     tally = r"8 runs played in [\d.]+ s, [\d.]+ episodes/s; 0 were kept from before; "
-    assert re.fullmatch(tally + "0 failed", printed.splitlines()[-1])
+    assert re.fullmatch(tally + "0 failed", output.splitlines()[-1])
     report = Path("out", "report.md").read_text()
     assert "episodes/s" not in report
     assert "| duration | 0.5 (default 500) |" in report
@@ -107,10 +107,10 @@ def test_figures_are_drawn_as_wide_and_in_the_letters_that_a_paper_needs(
 
 def test_study_plan_prints_conditions_once_and_what_they_take(file: Path, command: Command) -> None:
     file.write_text(f"{FILE}\n[[faults]]\nmodes = ['FM1']\nrobots = [1]\n")
-    printed = command("study plan mine.toml --policy swarm-dt --seeds 3 --first-seed 1000")
+    output = command("study plan mine.toml --policy swarm-dt --seeds 3 --first-seed 1000")
     # N = 4 is the baseline of the faults as well.
-    assert "Scalability (N = 4); Fault tolerance and robustness (no fault)" in printed
-    assert "4 conditions x 3 seeds from 1000 on = 12 runs" in printed
+    assert "Scalability (N = 4); Fault tolerance and robustness (no fault)" in output
+    assert "4 conditions x 3 seeds from 1000 on = 12 runs" in output
     assert list(Path().iterdir()) == [file]
 
 
@@ -124,9 +124,9 @@ def test_every_study_that_is_shipped_or_an_example_is_planned(command: Command) 
 
 
 def test_of_all_trainings_each_has_its_conditions(command: Command) -> None:
-    printed = command("study plan mine.toml --policy ppo-robust@all")
+    output = command("study plan mine.toml --policy ppo-robust@all")
     for training in ("ppo-robust@0", "ppo-robust@5"):
-        (row,) = [row for row in printed.splitlines() if training in row and "(N = 2)" in row]
+        (row,) = [row for row in output.splitlines() if training in row and "(N = 2)" in row]
         assert "Scalability" in row
 
 
@@ -221,50 +221,10 @@ def test_a_pilot_is_played_of_tasks_with_items_alone(monkeypatch: pytest.MonkeyP
     study_commands.say_what_a_pilot_shows(study)
 
 
-OUTCOMES: dict[str, tuple[Outcome, bool, str]] = {
-    "": (delivered(3), False, ""),
-    "nothing": (
-        delivered(0),
-        False,
-        "delivers nothing in a first run. Ctrl-C stops; finished runs are kept.",
-    ),
-    "all": (
-        delivered(3),
-        True,
-        (
-            "delivers every item before the end, so that P is capped and most verdicts will be "
-            "open. Nothing is capped where items come back, or where P is the rate until all are "
-            "delivered: add --restock or --clearing"
-        ),
-    ),
-    "the most": (
-        delivered(3),
-        True,
-        "has the largest P possible in a first run: most verdicts will be open.",
-    ),
-    "an error": (
-        Outcome(error="Traceback\nValueError: \x07 a\n"),
-        False,
-        r"fails in a first run: ValueError: \x07 a. Ctrl-C stops; finished runs are kept.",
-    ),
-    "a shape": (
-        Outcome(error="Traceback\nPolicyError: A: commands of shape (2, 3)\n"),
-        False,
-        "fails in a first run: A: commands of shape (2, 3)",
-    ),
-}
-
-
-@pytest.mark.parametrize("what", OUTCOMES)
-def test_what_a_first_run_shows_of_a_policy_is_told(
-    what: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    outcome, has_cap, sentence = OUTCOMES[what]
-    study = Study.from_file(
-        "mine.toml",
-        first_seed=7,
-        performance="longest_standstill:60" if what == "the most" else None,
-    )
+def play_pilot(
+    monkeypatch: pytest.MonkeyPatch, outcome: Outcome, performance: str | None = None
+) -> list[tuple[int, int]]:
+    """Say what a pilot shows whose runs give an outcome; return their robots and seeds."""
     runs: list[tuple[int, int]] = []
 
     def run(case: Any, _: str, seed: int) -> Any:
@@ -272,24 +232,70 @@ def test_what_a_first_run_shows_of_a_policy_is_told(
         return SimpleNamespace(play=lambda: outcome)
 
     monkeypatch.setattr(study_commands, "Run", run)
-    monkeypatch.setattr(study_commands, "is_capped", lambda *_: has_cap)
-    if what == "a shape":
-        with pytest.raises(StudyError, match=f"^swarm-dt {re.escape(sentence)}$"):
-            study_commands.say_what_a_pilot_shows(study)
-    else:
-        study_commands.say_what_a_pilot_shows(study)
-        assert capsys.readouterr().out == (f"swarm-dt {sentence}\n" if sentence else "")
-    assert runs == [(4, 7)]  # in the base scenario alone
+    study = Study.from_file("mine.toml", first_seed=7, performance=performance)
+    study_commands.say_what_a_pilot_shows(study)
+    return runs
+
+
+@pytest.mark.parametrize(
+    ("outcome", "performance", "sentence"),
+    [
+        (delivered(3), None, ""),
+        (
+            *(delivered(0), None),
+            "swarm-dt delivers nothing in a first run. Ctrl-C stops; finished runs are kept.\n",
+        ),
+        (
+            *(delivered(3, all_delivered=True), None),
+            (
+                "swarm-dt delivers every item before the end, so that P is capped and most "
+                "verdicts will be open. Nothing is capped where items come back, or where P is the "
+                "rate until all are delivered: add --restock or --clearing\n"
+            ),
+        ),
+        (
+            *(delivered(0), "longest_standstill:60"),
+            "swarm-dt has the largest P possible in a first run: most verdicts will be open.\n",
+        ),
+        (delivered(3, all_delivered=True), "longest_standstill:60", ""),
+        (
+            *(Outcome(error="Traceback\nValueError: \x07 a\n"), None),
+            (
+                "swarm-dt fails in a first run: ValueError: \\x07 a. Ctrl-C stops; finished runs "
+                "are kept.\n"
+            ),
+        ),
+    ],
+)
+def test_what_a_first_run_shows_of_a_policy_is_told(
+    outcome: Outcome,
+    performance: str | None,
+    sentence: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    in_base_scenario_alone = [(4, 7)]
+    assert play_pilot(monkeypatch, outcome, performance) == in_base_scenario_alone
+    assert capsys.readouterr().out == sentence
+
+
+def test_commands_of_a_wrong_shape_in_a_first_run_end_the_study(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    outcome = Outcome(error="Traceback\nPolicyError: A: commands of shape (2, 3)\n")
+    sentence = r"^swarm-dt fails in a first run: A: commands of shape \(2, 3\)$"
+    with pytest.raises(StudyError, match=sentence):
+        play_pilot(monkeypatch, outcome)
 
 
 def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says_so(
     command: Command,
 ) -> None:
     assert "xploratory" not in command(f"{RUN} --out out")
-    printed = command(f"{RUN} --out out --seeds 4")
+    output = command(f"{RUN} --out out --seeds 4")
     # It warns before it plays, so that one can still stop it.
-    warning = printed.index("This study declared other seeds or another P before its first run")
-    assert warning < printed.index("4 paired seeds")
+    warning = output.index("This study declared other seeds or another P before its first run")
+    assert warning < output.index("4 paired seeds")
     assert "exploratory: they are over other seeds" in Path("out", "report.md").read_text()
     assert "holds the study 'mine'" in command("study run quick --out out", code=2)
     # What it proposes is a study whose verdicts stand.
@@ -310,35 +316,35 @@ def test_options_of_run_change_the_study_and_failed_runs_its_exit_code(
     assert Study.stored("results/mine-restock").specification.scenario.restock  # type: ignore[attr-defined]
     assert "did you mean 'mujoco'" in command(f"{RUN} --bodies mujoko", code=2)
     file.write_text(FILE.replace("n_items = 8, duration = 2", "n_items = 1, duration = 60"))
-    printed = command(f"{RUN} --policy homing --seeds 1")
-    assert "homing delivers every item before the end" in printed
-    printed = command(f"{RUN} --policy homing --seeds 1 --performance on_time --set order_due=60")
-    assert "homing has the largest P possible in a first run: most verdicts will be" in printed
+    output = command(f"{RUN} --policy homing --seeds 1")
+    assert "homing delivers every item before the end" in output
+    output = command(f"{RUN} --policy homing --seeds 1 --performance on_time --set order_due=60")
+    assert "homing has the largest P possible in a first run: most verdicts will be" in output
     # It stands beside the study of the file's own policies.
     assert Path("results/mine-homing/report.html").exists()
     Path("broken_policy.py").write_text(BROKEN)
-    printed = command(f"{RUN} --policy broken_policy:Broken --restock --out broken", code=1)
-    assert "3 failed, the first with RuntimeError: a wheel came off" in printed
-    assert "Stopped, as nothing works" in printed
+    output = command(f"{RUN} --policy broken_policy:Broken --restock --out broken", code=1)
+    assert "3 failed, the first with RuntimeError: a wheel came off" in output
+    assert "Stopped, as nothing works" in output
     assert "2 of 2 runs failed" in Path("broken", "report.md").read_text()
 
 
 @pytest.mark.daily
 def test_robots_of_another_engine_play_a_study(command: Command) -> None:
     command(f"{RUN} --bodies mujoco --seeds 1")
-    moved = Study.stored("results/mine-bodies-mujoco")
-    assert {case.scenario.bodies for case in moved.plan().cases} == {"mujoco"}  # type: ignore[attr-defined]
+    study = Study.stored("results/mine-bodies-mujoco")
+    assert {case.scenario.bodies for case in study.plan().cases} == {"mujoco"}  # type: ignore[attr-defined]
 
 
 def test_a_study_and_its_shards_are_kept_under_its_name_and_merged(command: Command) -> None:
     merge = "study merge results/mine/shard-*-of-2 --out results/mine"
     for number in (1, 2):
-        printed = command(f"{RUN} --shard {number}/2")
-        assert "2 runs played" in printed
-        assert merge in printed
+        output = command(f"{RUN} --shard {number}/2")
+        assert "2 runs played" in output
+        assert merge in output
     shards = (f"results/mine/shard-{number}-of-2" for number in (1, 2))
-    printed = command(merge.replace("results/mine/shard-*-of-2", " ".join(shards)))
-    assert "study report results/mine" in printed
+    output = command(merge.replace("results/mine/shard-*-of-2", " ".join(shards)))
+    assert "study report results/mine" in output
     assert "0 runs played" in command(RUN)
     assert stored("results/mine") == 4
 
@@ -347,8 +353,8 @@ def test_a_trained_policy_is_called_by_the_name_on_its_card(file: Path, command:
     model = WEIGHTS / "ppo-delivery.safetensors"
     name = read_card(model).name
     shutil.copy(model, "first.safetensors")
-    printed = command("run --policy first.safetensors --set duration=1")
-    assert f"robots with {name}, seed 0" in printed
+    output = command("run --policy first.safetensors --set duration=1")
+    assert f"robots with {name}, seed 0" in output
     study = Study.from_file(file, out="out", policies=["first.safetensors"])
     study.run()
     Path("first.safetensors").unlink()  # the store knows the name, whatever became of the file

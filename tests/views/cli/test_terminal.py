@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -26,6 +27,12 @@ from tests.made_up import delivered, looked_at, paper
 def console_of(width: int | None) -> Callable[..., Console]:
     """Return what stands for the console: a terminal of a width; None: a pipe or a file."""
     return partial(Console, width=width, force_terminal=width is not None)
+
+
+@pytest.fixture(autouse=True)
+def _no_wishes_about_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("COLUMNS", "FORCE_COLOR", "NO_COLOR", "TERM"):
+        monkeypatch.delenv(name, raising=False)
 
 
 @pytest.fixture(scope="module")
@@ -48,9 +55,9 @@ def test_terminal_pipe_and_file_have_the_same_content_and_no_row_is_folded(
     for results, report in documents:
         monkeypatch.setattr(terminal, "document", lambda _, report=report: report)
         terminal.show_report(results, tmp_path, full=False)
-        printed = capsys.readouterr().out
-        text, _, _ = printed.partition("\nReport: ")
-        assert "\x1b" not in printed
+        output = capsys.readouterr().out
+        text, _, _ = output.partition("\nReport: ")
+        assert "\x1b" not in output
         assert width is None or max(map(len, text.splitlines())) <= width
         unfolded = " ".join(text.split())
         study_answer = report.answer
@@ -60,21 +67,21 @@ def test_terminal_pipe_and_file_have_the_same_content_and_no_row_is_folded(
         for line in study_answer.lines:
             numbers = "  ".join(filter(None, [line.value, study_answer.interval(line)]))
             ends = rf"^.*{re.escape(numbers)} .*{re.escape(line.verdict.in_words)}$"
-            shown = [row for row in rows if re.fullmatch(ends, row)]
+            rows_of_line = [row for row in rows if re.fullmatch(ends, row)]
             # A narrow terminal has room for the ends of a question alone.
             question = line.question if width in (120, None) else line.question.partition(" ")[0]
-            assert any(row.startswith(question) for row in shown), line
+            assert any(row.startswith(question) for row in rows_of_line), line
 
 
 def test_at_a_terminal_text_is_folded_and_a_command_stands_whole_on_its_own_line(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text, command = "More seeds, which nobody has seen:", "judge homing --out mine-40"
-    printed = {
+    output = {
         None: f"{text} {command}\nAn end.\n",
         20: f"More seeds, which\nnobody has seen:\n{command}\nAn end.\n",
     }
-    for width, expected in printed.items():
+    for width, expected in output.items():
         monkeypatch.setattr(terminal, "Console", console_of(width))
         terminal.say(text, command)
         terminal.say("An end.")
@@ -154,9 +161,9 @@ def test_effects_that_fewer_seeds_would_tell_are_those_of_the_first_condition(
     results = documents[1][0]
     p = results.cells[0].by_seed
     share = 2.8 * np.std(p, ddof=1) / np.mean(p)
-    few, many = (f"{share * math.sqrt(2 / n_seeds):.2f}" for n_seeds in (10, 60))
+    effects = [f"{share * math.sqrt(2 / n_seeds):.2f}" for n_seeds in (10, 60)]
     assert what_the_rest_takes(results, 2.0).endswith(
-        f"tells effects of about {few}, 60 seeds those of about {many}."
+        f"tells effects of about {effects[0]}, 60 seeds those of about {effects[1]}."
     )
 
 
@@ -165,22 +172,24 @@ def test_of_a_study_that_goes_on_p_then_the_whole_answer_then_a_line_are_shown(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    seconds = iter([100.0, 105.0, 200.0, 205.0, 206.6, 207.0])
-    monkeypatch.setattr("time.monotonic", lambda: next(seconds))
-    terminal.AnswerSoFar(8).show(first_runs(10))
+    clock = SimpleNamespace(now=100.0)
+    monkeypatch.setattr(terminal, "time", SimpleNamespace(monotonic=lambda: clock.now))
+    first_answer, later_answer = terminal.AnswerSoFar(8), terminal.AnswerSoFar(10)
+    clock.now = 105.0
+    first_answer.show(first_runs(10))
     p = "swarm-dt: P [95 %] = 43.6 [41.1, 46.1] items in 500 s, N = 25, no fault; 10 paired seeds"
     assert capsys.readouterr().err == (
         f"After 5 s: {p} (0 to 9).\n{what_the_rest_takes(first_runs(10), 2.5)}\n"
     )
-    so_far = terminal.AnswerSoFar(10)
-    so_far.show(first_runs(10))  # nothing is played of which to tell the time
+    later_answer.show(first_runs(10))  # nothing is played of which to tell the time
     assert capsys.readouterr().err == f"After 5 s: {p} (0 to 9).\n"
     results, report = documents[1]
-    so_far.show(results)
+    clock.now = 106.6
+    later_answer.show(results)
     assert capsys.readouterr().err == (
         f"After 7 s, a first look:\n{terminal_answer(report.answer)}\n\n"
     )
-    so_far.show(results)
+    later_answer.show(results)
     assert capsys.readouterr().err == (
         "After 7 s, 60 seeds: 2 of 3 questions are clear, 0 are played no further.\n"
     )
@@ -232,14 +241,14 @@ def test_the_seeds_that_an_effect_needs_are_shown_of_each_comparison(
     results = documents[study][0]
     verdicts = tuple(results.verdicts[number] for number in numbers)
     terminal.show_power("a study", replace(results, verdicts=verdicts), effect)
-    title, _, columns, _, *printed, _, hint, _ = capsys.readouterr().out.splitlines()
+    title, _, columns, _, *table_rows, _, hint, _ = capsys.readouterr().out.splitlines()
     assert title == f"## Power, from {head}"
     n_seeds = head.partition(",")[0]
     assert columns == (
         "| policy | verdict on | assumed effect | seeds for 80% power | "
         f"distance that {n_seeds} find | seeds for equivalent at 10% |"
     )
-    assert printed == [f"| {row} |" for row in rows]
+    assert table_rows == [f"| {row} |" for row in rows]
     assert hint == "For another effect: swarm-logistics study plan 'a study' --effect 0.2"
 
 

@@ -65,13 +65,14 @@ def test_a_judged_world_has_a_name_and_the_options_that_judge_in_it_again(
 
 
 @pytest.mark.parametrize(
-    ("preset", "usual", "sentence"),
+    ("preset", "usual", "scenario", "sentence"),
     [
-        (None, None, ""),
-        ("dots", Scenario(n_robots=7), ""),
+        (None, None, Scenario.preset("paper").replace(n_items=9), ""),
+        ("dots", Scenario(n_robots=7), Scenario.preset("dots").replace(n_items=9), ""),
         (
             None,
             Scenario(n_robots=7, restock=True),
+            Scenario(n_robots=7, n_items=9, restock=True),
             (
                 "In the world of the preset paper, where items come back; --preset or --scenario "
                 "names another.\n"
@@ -80,6 +81,7 @@ def test_a_judged_world_has_a_name_and_the_options_that_judge_in_it_again(
         (
             None,
             Scenario(n_robots=7),
+            Scenario(n_robots=7, n_items=9),
             "In the world of the preset paper; --preset or --scenario names another.\n",
         ),
     ],
@@ -87,12 +89,11 @@ def test_a_judged_world_has_a_name_and_the_options_that_judge_in_it_again(
 def test_which_world_is_meant_is_told_where_nobody_named_one(
     preset: str | None,
     usual: Scenario | None,
+    scenario: Scenario,
     sentence: str,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    scenario = scenario_of(preset, None, ["n_items=9"], usual=usual)
-    base = usual if sentence and usual else Scenario.preset(preset or "paper")
-    assert scenario == base.replace(n_items=9)
+    assert scenario_of(preset, None, ["n_items=9"], usual=usual) == scenario
     assert capsys.readouterr().out == sentence
 
 

@@ -88,22 +88,14 @@ class Breaks(Exact):
         return super().move(orders)
 
 
-class Flat(Exact):
-    """Returns one number for each robot's position."""
+class Misread(Exact):
+    """Returns poses in which something cannot be."""
+
+    changes: ClassVar[dict[str, Any]] = {}
 
     def move(self, orders: Orders) -> Poses:
-        """Return a wrong shape."""
-        return super().move(orders)._replace(position=np.zeros(len(orders.laden)))
-
-
-class Misshapen(Exact):
-    """Returns something of a wrong shape."""
-
-    wrong: ClassVar[dict[str, Any]] = {}
-
-    def move(self, orders: Orders) -> Poses:
-        """Return one wrong shape."""
-        return super().move(orders)._replace(**self.wrong)
+        """Return poses that are changed."""
+        return super().move(orders)._replace(**self.changes)
 
 
 class Stays:
@@ -131,16 +123,6 @@ class Notes(Exact):
         """Move as wanted."""
         self.orders.append(orders)
         return super().move(orders)
-
-
-class Vague(Exact):
-    """Does not know where robot 1 is, and does not say so."""
-
-    def move(self, orders: Orders) -> Poses:
-        """Return a pose that is no number."""
-        poses = super().move(orders)
-        poses.heading[1] = np.nan
-        return poses
 
 
 def scenario(name: str = "Exact", **fields: Any) -> Scenario:
@@ -177,16 +159,16 @@ def test_bodies_are_told_where_everything_is_and_what_robots_want() -> None:
     for _ in range(12):  # more than half a turn
         world.step(np.tile([0.3, 0.0, 0.5, 1.0], (3, 1)))
     drives = np.arange(3) != dead
-    wanted = np.array([0.6, 0.0, 3.0])  # of 2 m/s and 6 rad/s
+    motion = np.array([0.6, 0.0, 3.0])  # of 2 m/s and 6 rad/s
     for order in orders:
         drift = np.outer(state.robot_heading_drift, [0.0, 0.0, 1.0])
-        np.testing.assert_allclose(order.motion, (wanted + drift) * drives[:, None], atol=1e-12)
+        np.testing.assert_allclose(order.motion, (motion + drift) * drives[:, None], atol=1e-12)
         assert order.present.tolist() == [True] * 3
     assert [order.laden.tolist() for order in orders[:3]] == [[False] * 3, *[drives.tolist()] * 2]
     np.testing.assert_allclose(np.hypot(*state.robot_velocity.T), 0.6 * drives)
-    turned = np.remainder(state.robot_heading - before + np.pi, 2.0 * np.pi) - np.pi
+    turns = np.remainder(state.robot_heading - before + np.pi, 2.0 * np.pi) - np.pi
     expected = 1.2 * (3.0 + state.robot_heading_drift) * drives
-    np.testing.assert_allclose(np.cos(turned - expected), 1.0)
+    np.testing.assert_allclose(np.cos(turns - expected), 1.0)
     np.testing.assert_allclose(state.robot_turn_rate[drives], 3.0)
     np.testing.assert_allclose(state.robot_position, bodies.position)
     assert (np.abs(state.robot_heading) <= np.pi).all()
@@ -232,11 +214,11 @@ def test_a_lost_robot_leaves_the_arena_and_its_item_stays() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "message"),
+    ("changes", "message"),
     [
-        ("Flat", r"position of shape \(3,\): should be \(3, 2\)"),
+        ({"position": np.zeros(3)}, r"position of shape \(3,\): should be \(3, 2\)"),
         (
-            "Vague",
+            {"heading": np.array([0.0, np.nan, 0.0])},
             r"^bodies: pose \[.*, nan, .*\] of robot 1: should be finite, or the robot be lost$",
         ),
         ({"heading": np.zeros((3, 1))}, r"heading of shape \(3, 1\): should be \(3,\)$"),
@@ -248,10 +230,13 @@ def test_a_lost_robot_leaves_the_arena_and_its_item_stays() -> None:
         ),
     ],
 )
-def test_poses_that_cannot_be_are_refused(name: str | dict[str, Any], message: str) -> None:
-    world: Any = Warehouse(scenario(name if isinstance(name, str) else "Misshapen"))
+def test_poses_that_cannot_be_are_refused(
+    changes: dict[str, Any], message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = scenario("Misread")
+    monkeypatch.setattr(type(load_bodies(settings.bodies)), "changes", changes)
+    world = Warehouse(settings)
     world.reset(seed=0)
-    world._elsewhere._bodies.wrong = name
     with pytest.raises(BodiesError, match=message):
         world.step(np.zeros((3, 4)))
 

@@ -50,11 +50,14 @@ def test_a_plan_says_of_each_cell_what_it_is_whose_dock_and_whether_robots_start
     assert with_start.start_cells.astype(int).tolist() == [[0, 0, 1], [0, 0, 0]]
 
 
+def test_shipped_plans_are_named_in_order() -> None:
+    assert plan_names() == sorted(plan_names())
+
+
 @pytest.mark.parametrize("name", plan_names())
 def test_a_shipped_plan_keeps_its_name_and_gives_the_sizes(name: str) -> None:
     scenario = Scenario(floor=name)
     assert scenario.floor == name
-    assert plan_names() == sorted(plan_names())
     sizes = {"large": (40.0, 20.0), "day": (16.0, 10.0)}
     size = (scenario.warehouse_width, scenario.warehouse_height)
     assert size == sizes.get(name, (10.0, 10.0))

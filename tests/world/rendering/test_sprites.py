@@ -2,25 +2,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from swarm_logistics_env.world.rendering import palette
 from swarm_logistics_env.world.rendering.renderer import load_pygame
+from tests.world.rendering.test_renderer import count
 
 load_pygame()
 
 from swarm_logistics_env.world.rendering import sprites  # noqa: E402 - wants pygame
 
 
-def count(picture: NDArray[np.uint8], colour: palette.RGB) -> int:
-    return int((picture == colour).all(axis=2).sum())
-
-
 @pytest.mark.parametrize(
     ("charge", "colour", "n_filled"),
     [(1.0, "TIMER", 18), (0.3, "TIMER", 5), (0.29, "REQUESTED", 5), (0.01, "REQUESTED", 0)],
 )
-def test_a_bar_is_as_full_as_the_battery_and_of_another_colour_below_a_third_or_so(
+def test_a_bar_is_as_full_as_the_battery_and_of_another_colour_below_three_tenths(
     charge: float, colour: str, n_filled: int
 ) -> None:
     canvas = sprites.new_canvas(40, 40)

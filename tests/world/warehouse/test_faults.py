@@ -284,16 +284,14 @@ def test_faults_are_numbered_once_their_robots_are_chosen() -> None:
     world = Warehouse(SMALL)
     faults = [Fault("dead", 2, onset=0.5, role="searching"), Fault("FM1", 3), Fault("FM2", (6,))]
     world.reset(5, faults)
-    chosen = tuple(failed_robots(faults[1], 5, SMALL).tolist())
-    assert world.numbered_faults == (faults[0], Fault("FM1", chosen), faults[2])
-    assert world.struck_robots == tuple(sorted({*chosen, 6}))
+    robots_of_fm1 = tuple(failed_robots(faults[1], 5, SMALL).tolist())
+    assert world.numbered_faults == (faults[0], Fault("FM1", robots_of_fm1), faults[2])
+    assert world.struck_robots == tuple(sorted({*robots_of_fm1, 6}))
     steps(world, *[STAY] * 8, times=5)
-    struck = tuple(
-        np.flatnonzero(["dead" in modes for modes in world.state.failure_modes]).tolist()
-    )
-    assert len(struck) == 2
+    dead = tuple(np.flatnonzero(["dead" in modes for modes in world.state.failure_modes]).tolist())
+    assert len(dead) == 2
     numbered = world.numbered_faults
-    assert numbered == (Fault("dead", struck, onset=0.5), Fault("FM1", chosen), faults[2])
+    assert numbered == (Fault("dead", dead, onset=0.5), Fault("FM1", robots_of_fm1), faults[2])
     before = world.state.failure_modes
     world.set_faults(numbered)
     assert world.state.failure_modes == before
