@@ -186,7 +186,7 @@ NARROW = Section(
 
 def test_a_table_is_written_letter_by_letter(check_recorded: Check) -> None:
     text = latex_tables(PaperTables("By P_F.", (NARROW,), {"speed_1": "speed [m/s]"}))
-    check_recorded("table.tex", text.splitlines())
+    check_recorded("odd_table.tex", text.splitlines())
 
 
 @pytest.mark.parametrize(
