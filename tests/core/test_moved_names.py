@@ -47,12 +47,12 @@ def test_who_uses_a_former_name_is_named_in_the_warning() -> None:
 def test_former_names_are_found_by_one_finder_before_all_others(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    others = [finder for finder in sys.meta_path if type(finder).__name__ != "_FormerNames"]
-    monkeypatch.setattr(sys, "meta_path", [*others])
+    finders = [finder for finder in sys.meta_path if type(finder).__name__ != "_FormerNames"]
+    monkeypatch.setattr(sys, "meta_path", [*finders])
     for _ in range(2):
         install()
     first, *further = sys.meta_path
-    assert (type(first).__name__, further) == ("_FormerNames", others)
+    assert (type(first).__name__, further) == ("_FormerNames", finders)
 
 
 @pytest.mark.parametrize(

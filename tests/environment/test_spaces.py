@@ -38,14 +38,14 @@ def test_the_state_tells_what_the_world_holds_and_zeros_of_what_is_gone(n_reques
             assert robots[name].tolist() == rows[:, column].tolist()
         carried += int(robots["carrying_requested"].sum())
         timers = np.nan_to_num(world.robot_timer, nan=env.scenario.timer_limit)
-        way = np.maximum(env.scenario.storage_width - world.robot_position[:, 0], 0.0)
+        distance = np.maximum(env.scenario.storage_width - world.robot_position[:, 0], 0.0)
         for name, values in (
             ("cos_heading", np.cos(world.robot_heading)),
             ("sin_heading", np.sin(world.robot_heading)),
             ("velocity_x", np.clip(world.robot_velocity[:, 0], -2.0, 2.0)),
             ("velocity_y", np.clip(world.robot_velocity[:, 1], -2.0, 2.0)),
             ("timer", timers),
-            ("to_delivery", way),
+            ("to_delivery", distance),
         ):
             np.testing.assert_allclose(robots[name], np.where(present, values, 0.0), atol=1e-6)
         assert state[-1] == np.float32(world.time)

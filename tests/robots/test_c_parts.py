@@ -42,9 +42,9 @@ def test_constants_of_one_name_but_not_of_one_value_have_names_of_their_own() ->
         ("_gap", 1.0), ("GAP", 1.0), ("gap", 2.0), ("least", -1.0)
     )]  # fmt: skip
     assert names == ["GAP", "GAP", "GAP_1", "LEAST"]
-    constants, others = parts.texts()
+    constants, definitions = parts.texts()
     assert constants == ["#define GAP 1.0f\n#define GAP_1 2.0f\n#define LEAST (-1.0f)"]
-    assert others == []
+    assert definitions == []
     assert Parts().texts() == ([], [])
 
 

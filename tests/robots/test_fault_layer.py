@@ -170,15 +170,15 @@ def test_neighbours_that_are_neither_seen_nor_heard_go_with_their_messages(
     swarm = {"view_range": 2.0, "radio_range": 1.2, "timer_limit": 90.0, "message_size": 1}
     sensed = np.zeros(row.N_COLUMNS + row.N_NEIGHBOURS, np.float32)
     neighbours = sensed[row.NEIGHBOURS : row.LOWEST_TIMER].reshape(row.N_NEIGHBOURS, -1)
-    for index, place in enumerate((0.5, 1.5, 3.0, 0.9)):
-        neighbours[index] = 1.0, 0.0, place, 1.0, 5.0 + index
+    for index, x in enumerate((0.5, 1.5, 3.0, 0.9)):
+        neighbours[index] = 1.0, 0.0, x, 1.0, 5.0 + index
         sensed[row.MESSAGES + index] = 0.1 + 0.1 * index
     sensed[row.LOWEST_TIMER : row.CARRYING] = 5.0, 0.0, 0.5, 1.0
     expected = np.zeros_like(sensed)
     hears = mode not in ("FM3_hear", "dead")
     block = expected[row.NEIGHBOURS : row.LOWEST_TIMER].reshape(row.N_NEIGHBOURS, -1)
-    for index, (place, timer) in enumerate(zip(places, timers, strict=True)):
-        block[index] = 1.0, 0.0, place, hears, timer
+    for index, (x, timer) in enumerate(zip(places, timers, strict=True)):
+        block[index] = 1.0, 0.0, x, hears, timer
     expected[row.MESSAGES : row.MESSAGES + len(words)] = words
     expected[row.LOWEST_TIMER : row.CARRYING] = sensed[row.LOWEST_TIMER : row.CARRYING] * hears
     expected[: row.ITEMS] = 4.0 * (mode == "dead")

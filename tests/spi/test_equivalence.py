@@ -68,11 +68,15 @@ def test_clear_changes_have_their_verdict_unless_a_cap_could_turn_it(
 
 
 def test_a_p_counts_below_alpha_and_that_of_a_clear_change_is_of_the_nearer_end() -> None:
-    same, more, less = (spi.equivalence(*poisson(1, change)) for change in (0.0, 0.3, -0.3))
-    assert [same.verdict_for(p) for p in (None, 0.05, 0.0499)] == ["open", "open", "equivalent"]
+    unchanged, more, less = (spi.equivalence(*poisson(1, change)) for change in (0.0, 0.3, -0.3))
+    assert [unchanged.verdict_for(p) for p in (None, 0.05, 0.0499)] == [
+        "open",
+        "open",
+        "equivalent",
+    ]
     assert [more.verdict_for(p) for p in (None, 0.05, 0.0499)] == ["open", "open", "refuted"]
     assert (more.p_value, less.p_value) == (more.below.p_value, less.above.p_value)
-    assert same.confidence == pytest.approx(0.9)
+    assert unchanged.confidence == pytest.approx(0.9)
 
 
 def test_fault_tolerance_compares_with_the_robots_removed() -> None:

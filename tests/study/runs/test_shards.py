@@ -148,5 +148,5 @@ def test_what_changed_since_the_runs_were_stored_is_told(tmp_path: Path) -> None
         ({"name": "mine", "sizes": [{"values": [2, 4]}]}, ["name", "sizes"]),
         ({"task": "clearing"}, ["task"]),
     )
-    for others, differing in further:
-        assert noted.specification.differing(Specification(**{**fields, **others})) == differing
+    for changes, differing in further:
+        assert noted.specification.differing(Specification(**{**fields, **changes})) == differing

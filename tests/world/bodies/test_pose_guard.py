@@ -72,16 +72,16 @@ def test_a_robot_that_stands_undriven_is_not_frozen(watched: Watched) -> None:
     assert shares == [1.0] * 8 + [0.0] * 2
 
 
-@pytest.mark.parametrize(("way", "turn", "share"), [
+@pytest.mark.parametrize(("distance", "turn", "share"), [
     (0.0005, 0.0, 1.0), (0.0003, 0.0, 0.0), (0.0, 0.5, 1.0), (0.0, -0.5, 1.0), (0.0, 0.3, 0.0),
 ])  # fmt: skip
 def test_less_than_two_millimetres_and_two_degrees_in_half_a_second_is_no_motion(
-    way: float, turn: float, share: float
+    distance: float, turn: float, share: float
 ) -> None:
     guard = PoseGuard(np.zeros((1, 2)), np.zeros(1), PERIOD, SPEED)
     yes = np.array([True])
     for step in range(1, 6):
-        guard.update(np.array([[0.0, way * step]]), np.radians([turn * step]), yes, yes)
+        guard.update(np.array([[0.0, distance * step]]), np.radians([turn * step]), yes, yes)
     assert guard.speed_share[0] == share
 
 
