@@ -236,7 +236,7 @@ def test_series_stand_beside_each_other_with_what_was_published_and_where_p_is_c
         ("None", [[0.0, 0.0], [1.0, 0.0]]), ("None", [[0.0, 1.0], [1.0, 1.0]]),
         ("x", [[-0.02, 5.0]]), ("o", [[-0.12, 4.0]]),
     ]  # fmt: skip
-    marks = [(mark, *place) for mark, (place, *_) in places_of(first) if mark in ("o", "s")]
+    marks = [(mark, *point) for mark, (point, *_) in places_of(first) if mark in ("o", "s")]
     assert marks == [("o", -0.12, 4.0), ("s", 0.12, 2.0), ("o", 0.88, 4.0)]
     fills = [line.get_markerfacecolor() for line in first.lines if line.get_marker() in ("o", "s")]
     assert fills == [*drawing.COLOURS[:2], drawing.PAPER]

@@ -98,10 +98,12 @@ def test_the_first_line_says_what_is_less_the_same_and_cannot_be_compared() -> N
         "other conditions; open: FM1 m = 1."
     )
     assert (less.factors, less.turns) == ({"swarm-dt": ("1.48 [1.45, 1.51]", "more")}, "")
-    same = compare_policies(judged(study, lambda _, at, s: delivered(40 + s, digest=f"{at} {s}")))
+    unchanged = compare_policies(
+        judged(study, lambda _, at, s: delivered(40 + s, digest=f"{at} {s}"))
+    )
     words = "Whether P of homing or of swarm-dt is larger is unaffected: 1.00 [1.00, 1.00] times ("
-    assert same.sentence.startswith(f"{words}N = 25)")
-    assert same.factors == {"swarm-dt": ("1.00 [1.00, 1.00]", "unaffected")}
+    assert unchanged.sentence.startswith(f"{words}N = 25)")
+    assert unchanged.factors == {"swarm-dt": ("1.00 [1.00, 1.00]", "unaffected")}
     nothing = compare_policies(
         judged(study, lambda policy, *_: delivered(0 if policy == "swarm-dt" else 40))
     )
