@@ -150,10 +150,14 @@ def test_tests_that_run_a_line_come_first_the_quickest_before_the_others(
     assert of_tree.of("old/sizes.py", [5, 6], seconds=99.0) == in_order
     assert of_tree.of("old/sizes.py", [5], seconds=4.0) == in_order[:2]
     assert of_tree.of("old/sizes.py", [9], seconds=99.0) == []
+    assert of_tree.files_of("old/sizes.py", [5, 6]) == {MIRROR}
     monkeypatch.setattr(reached, "_record", None)  # it is made once for a tree
     package = sampling.Package(tree, ["sizes"], reached.Reached(tree, tmp_path, 1))
-    first = {fault.line: fault.tests[0] for fault in sampling.draw(package, 0)}
-    assert first == {5: in_order[0], 9: MIRROR}
+    faults = {fault.line: fault for fault in sampling.draw(package, 0)}
+    assert {line: fault.tests[0] for line, fault in faults.items()} == {5: in_order[0], 9: MIRROR}
+    # The generated pages are in the record of no line, and are asked of a line without one.
+    pages = ("tests/test_docs.py::test_generated_tables_are_current",)
+    assert {line: fault.wide for line, fault in faults.items()} == {5: (), 9: (pages,)}
 
 
 def test_faults_are_those_of_their_seed_and_change_the_code(tree: Path) -> None:

@@ -58,8 +58,7 @@ class Reached:
             lines: their numbers.
             seconds: that these tests take together at most, but for the first.
         """
-        contexts = self._contexts(file)
-        names = {context.rpartition("|")[0] for line in lines for context in contexts.get(line, ())}
+        names = self._names(file, lines)
         tests = sorted(names & self._seconds.keys(), key=lambda name: (self._seconds[name], name))
         chosen: list[str] = []
         for test in tests:
@@ -68,6 +67,19 @@ class Reached:
                 break
             chosen.append(test)
         return chosen
+
+    def files_of(self, file: str, lines: Iterable[int]) -> set[str]:
+        """Return the files of the tests that run one of the lines of a file in the package.
+
+        Empty: none runs one, or not in a test's process, or where a module is imported, too.
+        """
+        files = {name.partition("::")[0] for name in self._names(file, lines)}
+        return set() if "" in files else files
+
+    def _names(self, file: str, lines: Iterable[int]) -> set[str]:
+        """Return the names of the tests that run one of the lines; empty: while modules load."""
+        contexts = self._contexts(file)
+        return {context.rpartition("|")[0] for line in lines for context in contexts.get(line, ())}
 
     def _contexts(self, file: str) -> Mapping[int, list[str]]:
         if file not in self._by_file:

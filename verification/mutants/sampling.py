@@ -2,7 +2,8 @@
 
 Near tests are asked: those that run the line, where a record says which do, and those of near
 files; then those that compare with a recorded file, or generated pages with the code; then golden
-trajectories. Then the type checker runs; the share without it is printed, too.
+trajectories, both only where their files run the line. Then the type checker runs; the share
+without it is printed, too.
 """
 
 from __future__ import annotations
@@ -59,10 +60,10 @@ class Fault(NamedTuple):
     after: str
     text: str  # the line of the file
     source: str  # of the file with the fault in it
-    tests: tuple[str, ...]
+    tests: tuple[str, ...]  # the nearest
+    wide: tuple[tuple[str, ...], ...]  # those asked if the nearest catch nothing, group by group
     interpreted: bool  # whether kernels run in the interpreter, as it changes one
     compiles_anew: bool  # whether it may change how kernels are compiled
-    is_played: bool  # whether golden trajectories may run it
 
     @property
     def room(self) -> str:
@@ -134,6 +135,8 @@ class Package:
         self._nearest = Nearest(root)
         self._feeds_kernels = _files_of_kernels(trees, self._nearest)
         self._compiler = {file for file, tree in trees.items() if _imports_compiler(tree)}
+        recorded = sorted((root / "tests").rglob(_RECORDED))
+        self._recorded = [*(str(path.relative_to(root)) for path in recorded), _GENERATED]
         # File and number of each place in it.
         self.places = [
             (file, number)
@@ -162,9 +165,9 @@ class Package:
             text=source.splitlines()[place.node.lineno - 1].strip(),
             source=replaced(tree, place.node, new),
             tests=self._tests(file, place),
+            wide=self._wide_tests(file, place),
             interpreted=is_read_by_kernels,
             compiles_anew=file in self._compiler and not is_read_by_kernels,
-            is_played=self._nearest.is_played(file),
         )
 
     def _tests(self, file: str, place: Place) -> tuple[str, ...]:
@@ -172,9 +175,26 @@ class Package:
         nearest = self._nearest.of(file)
         if self._reached is None or place.is_outside_functions:
             return tuple(nearest)
-        node = place.node.test if isinstance(place.node, ast.If) else place.node
-        lines = range(node.lineno, (node.end_lineno or node.lineno) + 1)
-        return (*self._reached.of(file, lines, SECONDS_OF_REACHING), *nearest)
+        return (*self._reached.of(file, _lines(place), SECONDS_OF_REACHING), *nearest)
+
+    def _wide_tests(self, file: str, place: Place) -> tuple[tuple[str, ...], ...]:
+        """Return the recorded files and the trajectories that may run a place."""
+        played = [_TRAJECTORIES] if self._nearest.is_played(file) else []
+        is_traced = not (place.is_outside_functions or place.is_in_kernel)
+        files: set[str] = set()
+        if self._reached is not None and is_traced:
+            files = self._reached.files_of(file, _lines(place))
+        groups = (
+            tuple(test for test in tests if not files or test.partition("::")[0] in files)
+            for tests in (self._recorded, played)
+        )
+        return tuple(group for group in groups if group)
+
+
+def _lines(place: Place) -> range:
+    """Return the lines of a place; of a condition with its branches, those of the condition."""
+    node = place.node.test if isinstance(place.node, ast.If) else place.node
+    return range(node.lineno, (node.end_lineno or node.lineno) + 1)
 
 
 def draw(package: Package, seed: int) -> Iterable[Fault]:
@@ -265,14 +285,12 @@ def _caught_by(fault: Fault, copy: Path) -> str:
     test = _caught_by_nearest(fault, copy)
     if test:
         return test
-    tests = [str(path.relative_to(copy)) for path in sorted((copy / "tests").rglob(_RECORDED))]
-    tests.append(_GENERATED)
-    # Each has time of its own, as kernels may be compiled anew for most of it.
-    for group in (tests, [_TRAJECTORIES] if fault.is_played else []):
+    # Each group has time of its own, as kernels may be compiled anew for most of it.
+    for group in fault.wide:
         # Kernels are compiled, as the interpreter would take minutes.
         anew = fault.interpreted or fault.compiles_anew
-        wide = fault._replace(tests=tuple(group), interpreted=False, compiles_anew=anew)
-        if group and (test := _caught_by_nearest(wide, copy)):
+        wide = fault._replace(tests=group, interpreted=False, compiles_anew=anew)
+        if test := _caught_by_nearest(wide, copy):
             return test
     return ""
 
@@ -281,11 +299,12 @@ def _refused_by_types(fault: Fault, copy: Path) -> str:
     """Return what the type checker says of a fault alone; empty: nothing."""
     file = copy / PACKAGE / fault.file
     source = file.read_text(encoding="utf-8")
-    # A fault is written without comments, and so without what comments ignore.
-    with written(file, ast.unparse(ast.parse(source))):
-        before = type_errors(copy)
     with written(file, fault.source):
-        errors = type_errors(copy) - before
+        errors = type_errors(copy)
+    if errors:
+        # A fault is written without comments, and so without what comments ignore.
+        with written(file, ast.unparse(ast.parse(source))):
+            errors -= type_errors(copy)
     return "".join(f"{_BY_TYPES}{error}" for error in sorted(errors)[:1])
 
 
