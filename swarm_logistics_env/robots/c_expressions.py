@@ -219,7 +219,7 @@ class Expressions(Operators):
         numbers = tuple(value.constant for value in indices)
         if None not in numbers:
             return Known(owner.value[numbers[0] if len(numbers) == 1 else numbers])
-        lengths = owner.value.shape
+        lengths = np.shape(owner.value)
         if len(indices) < len(lengths):
             raise NoCError(f"a row of {owner.name}")
         table = self._parts.table(owner.name, np.asarray(owner.value))
@@ -235,6 +235,9 @@ class Expressions(Operators):
         return connected("&&" if is_and else "||", operands)
 
     def _comparison(self, node: ast.Compare) -> Value:
+        for symbol in node.ops:
+            if type(symbol) not in _COMPARISONS:
+                raise NoCError(type(symbol).__name__)
         values = [self.value_of(operand) for operand in (node.left, *node.comparators)]
         numbers = [value.constant for value in values]
         if None not in numbers:

@@ -85,6 +85,11 @@ static const real TABLE[4] = {
     4.0f,
 };
 
+static const real SHARES[4] = {
+    0.5f, -1.5f, 2.5f,
+    4.0f,
+};
+
 static const real ROWS[2][2] = {
     {0.5f, REAL(0.1)},
     {2.0f, 3.0f},
@@ -144,7 +149,7 @@ static real tuples(float x, int32_t n) {
     }
     first -= (real)COLUMN_FIRST * second;
     first -= (real)COLUMN_SECOND * second;
-    return first + pair.at[1] * REAL(copysign)(fabsf(x), second - 1.0f);
+    return first + SHARES[n] + pair.at[1] * REAL(copysign)(fabsf(x), second - 1.0f);
 }
 
 static real arrays(float x, int32_t n) {

@@ -24,6 +24,7 @@ from swarm_logistics_env.robots.c_values import DOUBLE, FLOAT, INT, ArrayOf, Kno
 
 TABLE = np.array([0.5, -1.5, 2.5, 4.0])
 ROWS = np.array([[0.5, 0.1], [2.0, 3.0]])
+SHARES = (0.5, -1.5, 2.5, 4.0)
 _LEAST = -0.5
 _STEP = 0.25
 WIDE = 0.1
@@ -81,7 +82,7 @@ def tuples(x: float, n: int) -> float:
         pair = 2.0, 3.0
     for column in (COLUMN.first, COLUMN.second):
         first -= column * second
-    return first + pair[1] * math.copysign(abs(x), second - 1.0)
+    return first + SHARES[n] + pair[1] * math.copysign(abs(x), second - 1.0)
 
 
 def arrays(x: float, n: int) -> float:
@@ -242,6 +243,7 @@ def kernel(x, n):
         ("return n << 1", "LShift"),
         ("return x + TABLE", "TABLE as a number"),
         ("return x.real", "x.real"),
+        ("return n in (1, 2)", "In"),
         ("return x[0]", "x[..]"),
         ("return TABLE[x]", "the index x"),
         ("return ROWS[n]", "a row of ROWS"),

@@ -87,7 +87,8 @@ def methods(plan: Plan, looks: tuple[int, ...] = ()) -> str:
     if plan.paired:
         runs = "trials" if plan.origin else "simulated runs"
         count = f"at least {n}" if looks else f"{n}"
-        trials = f"{count} {runs} of each of {len(plan.cases)} conditions, paired by seed"
+        pair = "block" if plan.origin and plan.origin.blocks else "seed"
+        trials = f"{count} {runs} of each of {len(plan.cases)} conditions, paired by {pair}"
         if plan.origin and any(trial.n_trials > 1 for trial in plan.origin.trials):
             trials = f"{n} blocks, by the means of their trials in {len(plan.cases)} conditions"
         test = "the paired t-test of a logarithm"

@@ -87,10 +87,7 @@ class PoseGuard:
 
     def _believe(self, has_pose: Flags, position: Numbers) -> Flags:
         """Return whose pose is believed: where it can have driven, or moved by a hand for sure."""
-        # Longer than that it was not driven, so it is no farther.
-        driven_for = np.minimum(self.age, STOP_AFTER + self._period)
-        reach = SLACK + HASTE * self._max_speed * driven_for
-        is_near = np.linalg.norm(position - self.position, axis=1) <= reach
+        is_near = np.linalg.norm(position - self.position, axis=1) <= self._reach()
         is_far = has_pose & ~is_near
         agrees = np.linalg.norm(position - self._jump, axis=1) <= SLACK
         self._settled = np.where(is_far & agrees, self._settled + self._period, 0.0)
@@ -99,10 +96,16 @@ class PoseGuard:
         self._is_jumping = np.where(has_pose, is_far & ~is_moved_by_hand, self._is_jumping)
         return np.asarray(has_pose & ~self._is_jumping, np.bool_)
 
+    def _reach(self) -> Numbers:
+        """Return how far each can have driven since its believed pose (N,) [m]."""
+        # Longer than that it was not driven, so it is no farther.
+        driven_for = np.minimum(self.age, STOP_AFTER + self._period)
+        return SLACK + HASTE * self._max_speed * driven_for
+
     def _take(self, is_believed: Flags, position: Numbers, heading: Numbers) -> None:
         displacement = (position - self.position)[is_believed]
         # A jump is no speed.
-        is_driven = np.linalg.norm(displacement, axis=1) <= SLACK + HASTE * self._max_speed
+        is_driven = np.linalg.norm(displacement, axis=1) <= self._reach()[is_believed]
         velocity = displacement / self.age[is_believed, None]
         self.velocity[is_believed] = velocity * is_driven[:, None]
         self.position[is_believed] = position[is_believed]

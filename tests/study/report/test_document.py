@@ -46,6 +46,7 @@ PAIRED = "seed,N,fault,m,P\n" + "".join(
     f"{seed},4,{fault},9\n" for fault in ("none,0", "stuck,1") for seed in range(8)
 )
 BLOCKS = PAIRED.replace("seed", "block").replace("\n7,", "\n6,")  # two trials in the last
+ONE_EACH = re.sub(r"^(\d)", r"room \1", PAIRED.replace("seed", "block"), flags=re.MULTILINE)
 FEWER = BLOCKS.rsplit("\n", 2)[0] + "\n"  # two of one condition alone
 UNPAIRED = re.sub(r"^[^,]*,", "", PAIRED, flags=re.MULTILINE)
 
@@ -81,6 +82,7 @@ UNPAIRED = re.sub(r"^[^,]*,", "", PAIRED, flags=re.MULTILINE)
             ["logarithm. An interval over trainings holds for trainings like those played;"],
         ),
         (PAIRED, (), ["in 8 trials of each of 2 conditions, paired by seed.", "paired t-test"]),
+        (ONE_EACH, (), ["in 8 trials of each of 2 conditions, paired by block.", "paired t-test"]),
         (BLOCKS, (), ["in 7 blocks, by the means of their trials in 2 conditions.", "paired t"]),
         (FEWER, (), ["in 7 blocks, by the means of their trials in 2 conditions.", "paired t"]),
         (UNPAIRED, (), ["in up to 8 independent trials of each of 2 conditions.", "Welch's t"]),

@@ -118,14 +118,17 @@ def test_a_robot_that_jumps_to_and_fro_stays_stopped(watched: Watched) -> None:
     assert set(shares) == {0.0}
 
 
-def test_a_robot_that_a_hand_has_moved_goes_on_from_where_it_is(watched: Watched) -> None:
+@pytest.mark.parametrize("way", [0.4, 1.0])
+def test_a_robot_that_a_hand_has_moved_goes_on_from_where_it_is(
+    watched: Watched, way: float
+) -> None:
     shares, speeds = [], []
     for _ in range(5):
-        shares.append(watched.step(off=1.0))
+        shares.append(watched.step(off=way))
         speeds.append(float(watched.guard.velocity[0, 0]))
     assert shares == [0.0] * 3 + [1.0] * 2  # once three more poses agree
     assert speeds == pytest.approx([0.0] * 4 + [SPEED])  # a jump is no speed
-    assert watched.guard.position[0, 0] == pytest.approx(watched.x + 1.0)
+    assert watched.guard.position[0, 0] == pytest.approx(watched.x + way)
 
 
 def test_poses_agree_on_where_a_hand_put_a_robot_to_within_five_centimetres(
