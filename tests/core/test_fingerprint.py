@@ -250,3 +250,7 @@ def test_the_code_version_is_that_of_what_decides_an_episode(
     before = package_code(*EPISODE_CODE)
     monkeypatch.setattr(Path, "read_text", read_changed)
     assert (package_code.__wrapped__(*EPISODE_CODE) != before) == counts
+
+
+def test_patterns_without_an_exclamation_mark_exclude_nothing() -> None:
+    assert package_code("**/report/*.py") == package_code("study/report/*.py")

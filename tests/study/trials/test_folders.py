@@ -100,6 +100,12 @@ def test_a_second_copy_of_a_file_does_not_count(tmp_path: Path, name: str) -> No
     assert {row.policy for row in trials.rows} == {"b" if name == "b.csv" else "day1"}
 
 
+def test_a_name_may_say_the_policy_by_that_word(tmp_path: Path) -> None:
+    text = DAY.replace("policy,", "").replace("A,", "")
+    write(tmp_path, **{"policy=ours/day1.csv": text, "policy=base/day1.csv": text})
+    assert {row.policy for row in read_trials(tmp_path).rows} == {"ours", "base"}
+
+
 def test_a_workbook_beside_its_csv_counts_once(tmp_path: Path) -> None:
     pytest.importorskip("openpyxl")
     write(tmp_path, **{"day1.csv": DAY.replace(",", ";").replace("20", "20,50")})

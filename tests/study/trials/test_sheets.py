@@ -58,6 +58,7 @@ def put(cell: str, value: object) -> Callable[[Any], None]:
         ("A2:A7", "B2:B4", "B5:B7"),
         ("A2:B2",),
         ("A9:B12",),  # of nothing
+        ("A9:B10", "C9:D10", "A11:B12", "C11:D12", "A13:B14", "A2:A7"),  # in any order
     ],
 )
 def test_a_merged_range_has_its_value_in_every_row(tmp_path: Path, ranges: tuple[str, ...]) -> None:
