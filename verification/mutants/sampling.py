@@ -1,8 +1,8 @@
 """Faults drawn over the whole package, and the share of them that the gate does not catch.
 
 Near tests are asked: those that run the line, where a record says which do, and those of near
-files; then those that compare with a recorded file, or generated pages with the code; then golden
-trajectories, both only where their files run the line. Then the type checker runs; the share
+files; then golden trajectories; then those that compare with a recorded file, or generated pages
+with the code, both only where their files run the line. Then the type checker runs; the share
 without it is printed, too.
 """
 
@@ -33,7 +33,7 @@ from .reached import Reached
 
 SECONDS_OF_COMPILING = 60.0  # of a core, for kernels that are compiled anew
 SECONDS_OF_REACHING = 40.0  # of the tests that run a line; the nearest follow
-LONGEST = 900.0  # [s] of the clock after which the tests of a fault are stopped
+LONGEST = 400.0  # [s] of the clock after which the tests of a fault are stopped
 # What worlds and policies do, to the bit: asked of faults in them that no other test catches.
 _TRAJECTORIES = "tests/verification/test_trajectories.py"
 # What every room gives, as files hold it: asked of faults that no nearer test catches.
@@ -178,7 +178,7 @@ class Package:
         return (*self._reached.of(file, _lines(place), SECONDS_OF_REACHING), *nearest)
 
     def _wide_tests(self, file: str, place: Place) -> tuple[tuple[str, ...], ...]:
-        """Return the recorded files and the trajectories that may run a place."""
+        """Return the trajectories and the recorded files that may run a place."""
         played = [_TRAJECTORIES] if self._nearest.is_played(file) else []
         is_traced = not (place.is_outside_functions or place.is_in_kernel)
         files: set[str] = set()
@@ -186,7 +186,7 @@ class Package:
             files = self._reached.files_of(file, _lines(place))
         groups = (
             tuple(test for test in tests if not files or test.partition("::")[0] in files)
-            for tests in (self._recorded, played)
+            for tests in (played, self._recorded)
         )
         return tuple(group for group in groups if group)
 
