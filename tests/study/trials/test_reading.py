@@ -83,6 +83,11 @@ def test_without_a_fault_an_onset_tells_no_conditions_apart(tmp_path: Path) -> N
     assert len({row.condition for row in rows}) == 3
 
 
+def test_only_a_number_may_be_the_same_in_all_trials_not_a_policy(tmp_path: Path) -> None:
+    with pytest.raises(spi.IndicatorError, match="has no column '5'"):
+        read(tmp_path, "robots,P\n4,9\n4,8\n", columns={"policy": "5"})
+
+
 HEAD = "trial,robots,fault,faulty,delivered\n"
 GOOD = "1,8,none,,10\n"
 JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"

@@ -64,3 +64,10 @@ def test_a_long_recording_is_bounded_and_its_frames_stay_right(
     assert frames[:-1] == [shown[time] for time in times[:-1]]
     failed = [sum(robot[2] == "4" for robot in frame["robots0"]) for frame in frames]
     assert failed == [2 if time >= 7.0 else 0 for time in times]
+
+
+def test_the_age_of_a_timer_is_told_until_it_has_run_out() -> None:
+    session = Session(SMALL)
+    session.state.robot_timer[:2] = 0.5 * SMALL.timer_limit, SMALL.timer_limit
+    ages = [robot[1] for robot in frame_message(session)["robots0"]]
+    assert ages[:2] == [4, None]
