@@ -288,7 +288,8 @@ class Central(Scripted):
         turns = ~state.is_holonomic
         if turns.any():
             forward = commands[turns, 0]
-            angle = np.arctan2(commands[turns, 1], forward)
+            # Numpy's last bit depends on the processor.
+            angle = np.array([math.atan2(y, x) for x, y in commands[turns, :2].tolist()])
             full_turn = self._full_turn[state.robot_kind[turns]]
             commands[turns, 2] = np.clip(angle / full_turn, -1.0, 1.0)
             commands[turns, 0] = np.maximum(forward, 0.0)

@@ -174,7 +174,9 @@ class MujocoBodies:
         velocity = data.qvel[self._velocities[:, None] + np.arange(2)]
         heading = data.qpos[self._positions + 2]  # of who slides
         w, x, y, z = data.qpos[self._positions[self._wheeled, None] + np.arange(3, 7)].T
-        heading[self._wheeled] = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        sine, cosine = 2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)
+        # Numpy's last bit depends on the processor.
+        heading[self._wheeled] = [*map(math.atan2, sine.tolist(), cosine.tolist())]
         return Poses(position, heading, velocity, np.zeros(len(position), np.bool_))
 
     def _take_out(self, robot: int) -> None:
