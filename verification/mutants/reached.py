@@ -77,7 +77,7 @@ class Reached:
         return set() if "" in files else files
 
     def _names(self, file: str, lines: Iterable[int]) -> set[str]:
-        """Return the names of the tests that run one of the lines; empty: while modules load."""
+        """Return the names of tests that run one of the lines; "" where a module's import does."""
         contexts = self._contexts(file)
         return {context.rpartition("|")[0] for line in lines for context in contexts.get(line, ())}
 

@@ -83,7 +83,7 @@ def test_without_a_fault_an_onset_tells_no_conditions_apart(tmp_path: Path) -> N
     assert len({row.condition for row in rows}) == 3
 
 
-def test_only_a_number_may_be_the_same_in_all_trials_not_a_policy(tmp_path: Path) -> None:
+def test_a_policy_is_named_by_a_column_and_not_by_a_number(tmp_path: Path) -> None:
     with pytest.raises(spi.IndicatorError, match="has no column '5'"):
         read(tmp_path, "robots,P\n4,9\n4,8\n", columns={"policy": "5"})
 
