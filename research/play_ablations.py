@@ -51,7 +51,7 @@ def versions() -> dict[str, Training]:
             teacher=None, agent_steps=recipe.agent_steps + teacher.decisions
         ),
         "rows of the teacher alone": recipe.replace(teacher=teacher.replace(shares=(1.0, 1.0))),
-        "no warm-up": recipe.replace(teacher=teacher.replace(warm_up=0)),
+        "no warm-up": recipe.replace(ppo=recipe.ppo.replace(warm_up=0)),
         "no pull": recipe.replace(teacher=teacher.replace(pull=0.0)),
         "three outputs, no classes": recipe.replace(
             network=network.replace(head="outputs", exploration=1.0)

@@ -31,7 +31,7 @@ from swarm_logistics_env.policies.policy import Described
 from swarm_logistics_env.policies.row_policy import UNREAD, RowPolicy
 from swarm_logistics_env.world.motion.classes import N_CLASSES
 from swarm_logistics_env.world.motion.frame import OUTPUTS, MotionView
-from swarm_logistics_env.world.motion.network_inputs import INPUTS, n_inputs
+from swarm_logistics_env.world.motion.network_inputs import INPUTS, input_names
 from swarm_logistics_env.world.motion.voices import MESSAGES, N_MESSAGES
 from swarm_logistics_env.world.scenario import Scenario
 
@@ -52,7 +52,11 @@ class Network(_Part):
         inputs: the names of its inputs in order, see `world.motion.INPUTS`.
         outputs: the names of its outputs in order, see `world.motion.OUTPUTS`.
         listens: whether it reads the lowest timer heard; if not, those inputs are zeros.
-        role: whether it reads two inputs more, behind the others: a number from -1 to 1 that each
+        sees_items: whether it reads 41 inputs more, behind the others: the nearness of items all
+            around, the six nearest in view, and the distance from the delivery area on a finer
+            scale (`world.motion.sight`). Without them a robot sees the requested item alone, and
+            the others only while it carries one.
+        role: whether it reads two inputs more, behind those: a number from -1 to 1 that each
             robot draws evenly every 40 s, and on which side of 0.2 that lies.
         talks: whether it tells its neighbours two numbers, how near the requested item and the
             delivery area are as it estimates them (`world.motion.voices`), and reads the highest
@@ -74,6 +78,7 @@ class Network(_Part):
     inputs: tuple[str, ...] = INPUTS
     outputs: tuple[str, ...] = OUTPUTS
     listens: bool = True
+    sees_items: bool = False
     role: bool = False
     talks: bool = False
     hidden: Annotated[tuple[Width, ...], Field(max_length=8)] = (128, 128)
@@ -94,7 +99,7 @@ class Network(_Part):
     def _leave_out_later_fields(self, serialize: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
         # Cards and identities of networks without them stay as they were before these fields.
         fields = serialize(self)
-        later = {"role": False, "talks": False, "head": "outputs"}
+        later = {"sees_items": False, "role": False, "talks": False, "head": "outputs"}
         return {name: v for name, v in fields.items() if name not in later or v != later[name]}
 
     @property
@@ -103,11 +108,16 @@ class Network(_Part):
         return self.head == "classes"
 
     @property
+    def reads(self) -> dict[str, bool]:
+        """What it reads besides `INPUTS`, by the arguments of `input_names` and `MotionView`."""
+        return {"sees_items": self.sees_items, "has_role": self.role, "talks": self.talks}
+
+    @property
     def widths(self) -> list[int]:
         """The numbers of inputs, of each hidden layer's values, and of what the last layer says."""
         n_answers = N_CLASSES if self.says_classes else len(self.outputs)
         n_messages = N_MESSAGES if self.talks else 0
-        return [n_inputs(self.role, self.talks), *self.hidden, n_answers + n_messages]
+        return [len(input_names(**self.reads)), *self.hidden, n_answers + n_messages]
 
 
 class Score(_Part):
@@ -212,6 +222,8 @@ class LearnedPolicy(RowPolicy, Described):
         )
         self._decides_every = network.decides_every
         self._listens = network.listens
+        if network.sees_items:
+            self.ignores = self.ignores - {"range_items"}
         if network.talks:
             self.ignores = self.ignores - {"neighbour_message"}
             self.messages = MESSAGES
@@ -230,7 +242,7 @@ class LearnedPolicy(RowPolicy, Described):
     def configure(self, scenario: Scenario) -> None:
         """Take what a robot's maker knows: its control period, its body, the size of messages."""
         network = self.card.network
-        self._frame = MotionView(scenario, network.listens, network.role, network.talks)
+        self._frame = MotionView(scenario, network.listens, **network.reads)
         self._message_size = scenario.message_size if network.talks else 0
         self.reset(0, 0)
 

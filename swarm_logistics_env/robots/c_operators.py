@@ -59,6 +59,8 @@ class Operators:
         """Return what Python's operator makes of two values."""
         is_whole = left.kind is INT and right.kind is INT
         match symbol:
+            case ast.Mod() if is_whole and None not in (left.constant, right.constant):
+                return constant(left.constant % right.constant)
             case ast.Mod():
                 name = "remainder_of" if is_whole else "modulo"
                 return self.helped(name, INT if is_whole else REAL, left, right)

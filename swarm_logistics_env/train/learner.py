@@ -18,11 +18,12 @@ from stable_baselines3 import PPO
 
 from swarm_logistics_env.core.errors import TrainingError
 from swarm_logistics_env.core.records import atomic_write
-from swarm_logistics_env.policies.learned import Network
+from swarm_logistics_env.policies.learned import LearnedPolicy, Network
 from swarm_logistics_env.train.actor_critic import ClassesPolicy, GaussianPolicy
 from swarm_logistics_env.train.settings import PPOSettings
 from swarm_logistics_env.train.training_worlds import NetworkView, check_finite
 from swarm_logistics_env.world.motion.classes import N_DIRECTIONS, classes_of
+from swarm_logistics_env.world.motion.network_inputs import input_names
 
 CHECKPOINT = "checkpoint.pt"
 STATE = ("num_timesteps", "_n_updates", "_last_obs", "_last_episode_starts")  # of the learner
@@ -111,12 +112,43 @@ def tensors_of(policy: Any) -> dict[str, NDArray[np.float32]]:
     tensors = {}
     if isinstance(policy, GaussianPolicy):
         tensors["deviations"] = _array(policy.log_std.exp())
-    hidden = [m for m in policy.mlp_extractor.policy_net if isinstance(m, torch.nn.Linear)]
-    last = [policy.action_net, policy.message_net] if policy.talks else [policy.action_net]
-    for layer, parts in enumerate([*([linear] for linear in hidden), last]):
+    for layer, parts in enumerate(_layers_of(policy)):
         tensors[f"layers.{layer}.weight"] = _array(torch.cat([part.weight for part in parts]))
         tensors[f"layers.{layer}.bias"] = _array(torch.cat([part.bias for part in parts]))
     return tensors
+
+
+def begin_from(start: LearnedPolicy, policy: Any, network: Network) -> None:
+    """Let PPO's policy begin as a trained one, with weights of 0 for what that does not read.
+
+    Noise begins as the settings have it, and messages that it does not say as they are untrained.
+
+    Args:
+        start: of which `network`, that of the policy, has the hidden layers and the head.
+    """
+    inputs = input_names(**network.reads)
+    columns = [inputs.index(name) for name in input_names(**start.card.network.reads)]
+    for layer, parts in enumerate(_layers_of(policy)):
+        weight = torch.from_numpy(start.tensors[f"layers.{layer}.weight"])
+        bias = torch.from_numpy(start.tensors[f"layers.{layer}.bias"])
+        first = 0
+        for part in parts:
+            rows = slice(first, first + part.out_features)
+            first = rows.stop
+            if first > len(bias):  # messages, which the start does not say
+                continue
+            with torch.no_grad():
+                part.weight.zero_()
+                part.weight[:, columns if layer == 0 else slice(None)] = weight[rows]
+                part.bias.copy_(bias[rows])
+
+
+def _layers_of(policy: Any) -> list[list[torch.nn.Linear]]:
+    """Return the actor's layers, the parts of each in the order of a policy file."""
+    modules = policy.mlp_extractor.policy_net
+    hidden = [[module] for module in modules if isinstance(module, torch.nn.Linear)]
+    last = [policy.action_net, policy.message_net] if policy.talks else [policy.action_net]
+    return [*hidden, last]
 
 
 def _array(tensor: torch.Tensor) -> NDArray[np.float32]:

@@ -156,6 +156,9 @@ class PPOSettings(Part):
         least_deviation: the lower limit of deviations at the start and at the end; it changes
             geometrically in between. Without it the noise vanishes long before the policy is good.
         least_until: the share of the training after which the limit stays at its end.
+        warm_up: the first updates in which the value network alone learns, where the actor can do
+            something already, of a teacher or from a start: one that learns from values of an
+            untrained value network forgets it.
         message_weight: the weight of the messages' squared error relative to the policy's loss,
             where a network talks: what it says is learned from what is so, known while it trains.
         value_hidden: widths of the value network, which is not shipped. It reads more than a robot
@@ -178,6 +181,7 @@ class PPOSettings(Part):
     deviations: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = (0.5, 0.5, 0.5)
     least_deviation: tuple[PositiveFloat, PositiveFloat] = (0.001, 0.001)
     least_until: Fraction = 1.0
+    warm_up: NonNegativeInt = 30
     message_weight: NonNegativeFloat = 1.0
     value_hidden: tuple[PositiveInt, ...] = (128, 128)
 
@@ -222,8 +226,6 @@ class Teaching(Part):
         noise: standard deviation of noise on what they do meanwhile, half of that on the gripper.
         rate: Adam's learning rate; 0.4 times that in the last quarter.
         epochs: how often a row is learned from, on average over all.
-        warm_up: PPO's first updates in which the value network alone learns: an actor that learns
-            from values of an untrained one forgets what it imitated.
         pull: the weight of the error beside the teacher in PPO's loss at first: the cross entropy
             of classes, or the mean square of outputs; 0: none.
         pull_until: the share of the training at which it has fallen linearly to 0.
@@ -235,7 +237,6 @@ class Teaching(Part):
     noise: NonNegativeFloat = 0.15
     rate: PositiveFloat = 1e-3
     epochs: PositiveInt = 10
-    warm_up: NonNegativeInt = 10
     pull: NonNegativeFloat = 0.0
     pull_until: Fraction = 1.0
 

@@ -21,6 +21,7 @@ from swarm_logistics_env.policies.policy import one_thread
 from swarm_logistics_env.train.evaluation import evaluate_score, versions
 from swarm_logistics_env.train.imitation import imitate
 from swarm_logistics_env.train.learner import (
+    begin_from,
     device_of,
     make_learner,
     read_checkpoint,
@@ -137,6 +138,9 @@ def _train(
     if learner.num_timesteps < training.agent_steps:
         with _explain_end(training, out, learner, log):
             if state is None:
+                start = training.start_policy
+                if start is not None:
+                    begin_from(start, learner.policy, training.network)
                 imitate(training, learner, log, generator(training.seed, "imitation"))
             log.versions = versions()
             total = training.agent_steps

@@ -10,7 +10,8 @@ from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model
 from swarm_logistics_env.core.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.core.records import FileName, each_of, one_of, read_table
 from swarm_logistics_env.environment.rewards import RewardTerms
-from swarm_logistics_env.policies.learned import Network
+from swarm_logistics_env.policies.learned import LearnedPolicy, Network
+from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.train.settings import (
     Conditions,
@@ -36,6 +37,10 @@ def _scenario_of(fields: object) -> object:
     return WAREHOUSE.vary(Scenario(), fields) if isinstance(fields, dict) else fields
 
 
+def _start_of(policy: object) -> object:
+    return None if policy is None else PolicySpec.of(policy)
+
+
 class Training(Part):
     """Everything that decides the result of a training.
 
@@ -57,7 +62,10 @@ class Training(Part):
         indicators: the indicators that are paid beside the task reward; none: the task reward.
         conditions: kinds of episodes that are mixed; none: no robot fails.
         network: what the policy reads and commands.
-        teacher: a script that it imitates at first; none: it learns from nothing.
+        start: a policy that `train` wrote, by its name or its path, whose network it goes on from;
+            what that does not read begins with weights of 0. Of "ppo-robust@all", which stands for
+            several trainings, that of number `seed` is taken, round and round.
+        teacher: a script that it imitates at first; with neither it learns from nothing.
         ppo: settings of the learner.
         evaluation: what is measured during the training.
         scores: what is measured at its end.
@@ -83,6 +91,7 @@ class Training(Part):
     indicators: Annotated[Indicators | None, BeforeValidator(one_of(Indicators))] = None
     conditions: Annotated[tuple[Conditions, ...], BeforeValidator(each_of(Conditions))] = ()
     network: Annotated[Network, BeforeValidator(one_of(Network))] = Network()
+    start: Annotated[PolicySpec | None, BeforeValidator(_start_of)] = None
     teacher: Annotated[Teaching | None, BeforeValidator(one_of(Teaching))] = None
     ppo: Annotated[PPOSettings, BeforeValidator(one_of(PPOSettings))] = PPOSettings()
     evaluation: Annotated[Evaluation, BeforeValidator(one_of(Evaluation))] = Evaluation()
@@ -106,17 +115,10 @@ class Training(Part):
                 raise ValueError(
                     f"scenario.message_size = {message_size}: should be {size}, as {reason}"
                 )
-        usual_weight = PPOSettings.model_fields["message_weight"].default
-        if not self.network.talks and self.ppo.message_weight != usual_weight:
-            raise ValueError(f"ppo.message_weight: should be left out, as {reason}")
+        self._check_start()
+        self._check_ppo()
         self._check_decisions()
         self._check_indicators()
-        if self.network.says_classes:
-            for name in ("deviations", "least_deviation", "least_until"):
-                if getattr(self.ppo, name) != PPOSettings.model_fields[name].default:
-                    raise ValueError(
-                        f'ppo.{name}: should be left out, as head = "classes" has no deviations'
-                    )
         RewardTerms(self.final_rewards)
         for term in self.final_rewards:
             if term not in self.rewards:
@@ -139,6 +141,40 @@ class Training(Part):
                 f"{self.rows} robots x {self.ppo.n_steps} steps"
             )
         return self
+
+    def _check_start(self) -> None:
+        """Raise a ValueError if the network cannot go on from that of the start."""
+        policy = self.start_policy
+        if policy is None:
+            return
+        of_start = policy.card.network
+        for name in ("hidden", "head"):
+            value = getattr(self.network, name)
+            if value != getattr(of_start, name):
+                raise ValueError(
+                    f"network.{name} = {value!r}: should be {getattr(of_start, name)!r}, as "
+                    f"{policy.card.name} has, from which it goes on"
+                )
+        for name, is_read in of_start.reads.items():
+            if is_read and not self.network.reads[name]:
+                raise ValueError(
+                    f"start: should be a network without {name.removeprefix('has_')} = true, or "
+                    "the network should have that, too"
+                )
+
+    def _check_ppo(self) -> None:
+        """Raise a ValueError if a setting of PPO would change nothing."""
+        unused = {}
+        if not self.network.talks:
+            unused["message_weight"] = "network.talks = false"
+        if self.start is None and self.teacher is None:
+            unused["warm_up"] = "it learns from nothing"
+        if self.network.says_classes:
+            of_noise = ("deviations", "least_deviation", "least_until")
+            unused |= dict.fromkeys(of_noise, 'head = "classes" has no deviations')
+        for name, reason in unused.items():
+            if getattr(self.ppo, name) != PPOSettings.model_fields[name].default:
+                raise ValueError(f"ppo.{name}: should be left out, as {reason}")
 
     def _check_decisions(self) -> None:
         """Raise a ValueError if an episode could end between two decisions."""
@@ -181,6 +217,22 @@ class Training(Part):
         return {
             term: weight + change * (ends[term] - weight) for term, weight in self.rewards.items()
         }
+
+    @property
+    def start_policy(self) -> LearnedPolicy | None:
+        """The policy that it goes on from; None: it begins with an untrained network.
+
+        Raises:
+            ValueError, PolicyError: there is no such policy, or `train` did not write it.
+        """
+        if self.start is None:
+            return None
+        trainings = self.start.trainings
+        start = trainings[self.seed % len(trainings)] if trainings else self.start
+        policy = None if start.runs_code else start.load()
+        if not isinstance(policy, LearnedPolicy):
+            raise ValueError(f"start = {start.title!r}: should be a policy that train wrote")
+        return policy
 
     @property
     def each_world(self) -> tuple[tuple[WorldKind, Scenario], ...]:

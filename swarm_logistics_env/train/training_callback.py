@@ -126,6 +126,7 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
             floor = self._training.ppo.floor(progress)
             with torch.no_grad():
                 self.model.policy.log_std.clamp_(min=math.log(floor))
+        self._warm_up()
         if self._training.teacher is not None:
             self._follow_teacher(self._training.teacher, progress)
         curve = self._log.curve
@@ -136,14 +137,19 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
             self._save()
         self._cpu = time.process_time()
 
-    def _follow_teacher(self, teaching: Teaching, progress: float) -> None:
-        """Let the value network warm up, and the teacher pull or go."""
-        ppo = self._training.ppo
-        n_updates = self.num_timesteps // (self._training.rows * ppo.n_steps)
+    def _warm_up(self) -> None:
+        """Let the value network learn alone for a while, where the actor can do something."""
+        training = self._training
+        if training.start is None and training.teacher is None:
+            return
+        n_updates = self.num_timesteps // (training.rows * training.ppo.n_steps)
         for parameter in self.model.policy.actor_parameters():
-            parameter.requires_grad_(n_updates >= teaching.warm_up)
+            parameter.requires_grad_(n_updates >= training.ppo.warm_up)
+
+    def _follow_teacher(self, teaching: Teaching, progress: float) -> None:
+        """Let the teacher pull, or go."""
         pull = teaching.pull_at(progress)
-        pull_by(self.model, pull, ppo)
+        pull_by(self.model, pull, self._training.ppo)
         if pull == 0.0:
             self.model.env.teacher = None
 

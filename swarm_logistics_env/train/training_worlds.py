@@ -123,7 +123,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     def __init__(self, training: Training) -> None:
         worlds = make_worlds(training)
         network = training.network
-        self.frame = MotionView(training.scenario, network.listens, network.role, network.talks)
+        self.frame = MotionView(training.scenario, network.listens, **network.reads)
         self._says_classes = network.says_classes
         self._n_messages = N_MESSAGES if network.talks else 0
         teaching = training.teacher

@@ -18,10 +18,10 @@ from swarm_logistics_env.policies.learned import LearnedPolicy, tensor_shapes
 from swarm_logistics_env.policies.network_steps import choose_outputs, explore
 from swarm_logistics_env.policies.policy import start
 from swarm_logistics_env.policies.row_policy import refuse_messages
-from swarm_logistics_env.world.motion import INPUTS
+from swarm_logistics_env.world.motion import INPUTS, MotionView
 from swarm_logistics_env.world.motion.classes import N_CLASSES, classes_of
 from swarm_logistics_env.world.motion.voices import MESSAGES
-from swarm_logistics_env.world.observations import N_COLUMNS, TURN_RATE
+from swarm_logistics_env.world.observations import N_BEAMS, N_COLUMNS, RANGE_ITEMS, TURN_RATE
 from swarm_logistics_env.world.warehouse import Warehouse
 
 Tensors = dict[str, NDArray[np.float32]]
@@ -229,6 +229,40 @@ def test_a_network_that_talks_tells_its_neighbours_two_numbers_and_hears_them(
     with pytest.raises(PolicyError, match="of 141 columns: should be at least 157"):
         talking.act(rows[:, :N_COLUMNS])
     assert talking.memories()["output_dock_nearness"].tolist() == commands[:, 5].tolist()
+
+
+def test_a_network_that_sees_items_does_other_things_where_they_lie_elsewhere(
+    card: PolicyCard,
+) -> None:
+    network = card.network.replace(sees_items=True, exploration=0.0)
+    rng = np.random.default_rng(1)
+    tensors = {
+        name: rng.normal(0.0, 0.3, shape).astype(np.float32)
+        for name, shape in tensor_shapes(network).items()
+    }
+    policy = LearnedPolicy(card.replace(network=network), tensors)
+    rows = np.zeros((2, N_COLUMNS), np.float32)
+    rows[:, RANGE_ITEMS : RANGE_ITEMS + N_BEAMS] = 2.0
+    rows[1, RANGE_ITEMS + 3] = 0.2
+    rows[:, TURN_RATE] = 0.0
+    inputs = MotionView(Scenario(), **network.reads)
+    inputs.begin(np.zeros(2, np.uint64))
+    read = inputs.read(rows)
+    assert policy.outputs_of(read[:1]).tolist() != policy.outputs_of(read[1:]).tolist()
+    assert "range_items" not in policy.ignores
+    assert "range_items" in LearnedPolicy.ignores
+    assert network.model_dump()["sees_items"] is True
+    assert "sees_items" not in card.network.model_dump()
+
+    class Own(LearnedPolicy):
+        """Asked for each command."""
+
+    scenario = Scenario(n_robots=6, n_items=8, duration=20.0)
+    digests = [
+        run_episode(scenario, kind(policy.card, tensors), seed=2).digest
+        for kind in (LearnedPolicy, Own)
+    ]
+    assert digests[0] == digests[1]
 
 
 def test_a_network_that_talks_plays_where_messages_have_its_size_and_cards_say_so(

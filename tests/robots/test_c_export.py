@@ -177,8 +177,12 @@ def test_a_run_of_the_c_file_in_double_is_the_run_in_python(
 
 @needs_gcc
 @pytest.mark.compiled
-def test_a_network_that_says_classes_and_has_a_role_decides_so_in_c(tmp_path: Path) -> None:
-    network = Network(hidden=(12,), head="classes", role=True, exploration=0.5, decides_every=2)
+def test_a_network_that_sees_items_says_classes_and_has_a_role_decides_so_in_c(
+    tmp_path: Path,
+) -> None:
+    network = Network(
+        hidden=(12,), sees_items=True, head="classes", role=True, exploration=0.5, decides_every=2
+    )
     rng = np.random.default_rng(0)
     shapes = tensor_shapes(network)
     tensors = {name: rng.normal(0, 0.5, shape).astype("f4") for name, shape in shapes.items()}

@@ -12,15 +12,24 @@ pytest.importorskip("stable_baselines3")
 
 import torch
 
+from swarm_logistics_env import policies
 from swarm_logistics_env.core.errors import TrainingError
-from swarm_logistics_env.policies.learned import Network
-from swarm_logistics_env.train.learner import make_learner, read_checkpoint, save_checkpoint
+from swarm_logistics_env.policies.files import read_policy
+from swarm_logistics_env.policies.learned import LearnedPolicy, Network, PolicyCard, tensor_shapes
+from swarm_logistics_env.train.learner import (
+    begin_from,
+    make_learner,
+    read_checkpoint,
+    save_checkpoint,
+    tensors_of,
+)
 from swarm_logistics_env.train.privileged import PRIVILEGED
 from swarm_logistics_env.train.settings import PPOSettings
+from swarm_logistics_env.train.trainer import train
 from swarm_logistics_env.train.training_worlds import NetworkView
 from swarm_logistics_env.world.motion.classes import GROUPS, outputs_of
 from swarm_logistics_env.world.motion.frame import OUTPUTS
-from swarm_logistics_env.world.motion.network_inputs import INPUTS
+from swarm_logistics_env.world.motion.network_inputs import INPUTS, input_names
 from swarm_logistics_env.world.motion.voices import N_MESSAGES
 
 
@@ -177,3 +186,58 @@ def test_classes_are_drawn_at_the_temperature_of_the_file_or_at_1_and_drive_ahea
         first = policy.answers_of(torch.zeros(1, len(INPUTS)))
     assert first[first != 0.0].tolist() == [3.0, 3.0]  # of the direction and the speed
     assert policy.likeliest_outputs(first)[0, :2].tolist() == pytest.approx([0.75, 0.0])
+
+
+@pytest.mark.parametrize("talks", [False, True])
+@pytest.mark.parametrize("head", ["outputs", "classes"])
+def test_a_network_that_goes_on_says_what_its_start_said_whatever_else_it_reads(
+    small: Any, head: Any, talks: bool
+) -> None:
+    of_start = Network(hidden=(8,), head=head, role=True, talks=talks)
+    network = of_start.replace(sees_items=True, talks=True)
+    rng = np.random.default_rng(0)
+    tensors = {
+        name: rng.normal(0.0, 0.3, shape).astype(np.float32)
+        for name, shape in tensor_shapes(of_start).items()
+    }
+    start = LearnedPolicy(PolicyCard(name="start", network=of_start), tensors)
+    scenario = small().scenario.replace(message_size=N_MESSAGES)
+    training = small(network=network, scenario=scenario)
+    policy = make_learner(NetworkView(training), network, training.ppo, 0, "cpu").policy
+    begin_from(start, policy, network)
+    inputs = rng.normal(size=(50, network.widths[0])).astype(np.float32)
+    names = input_names(**network.reads)
+    read = inputs[:, [names.index(name) for name in input_names(**of_start.reads)]]
+    answers = start.outputs_of(read)
+    going_on = LearnedPolicy(PolicyCard(name="on", network=network), tensors_of(policy))
+    n_answers = answers.shape[1]
+    np.testing.assert_allclose(going_on.outputs_of(inputs)[:, :n_answers], answers, atol=1e-5)
+
+
+def test_a_training_goes_on_from_a_policy_file_once_its_critic_is_warm(
+    small: Any, tmp_path: Path
+) -> None:
+    start = train(small(), tmp_path / "start")
+    network = small().network.replace(sees_items=True)
+    ppo = small().ppo.replace(warm_up=2)
+    training = small(network=network, start=str(start), ppo=ppo, agent_steps=480)
+    before = read_policy(start).tensors
+    after = read_policy(train(training, tmp_path / "on")).tensors
+    n_read = len(INPUTS)
+    np.testing.assert_array_equal(after["layers.0.weight"][:, :n_read], before["layers.0.weight"])
+    assert not after["layers.0.weight"][:, n_read:].any()
+    assert after["layers.1.weight"].tolist() == before["layers.1.weight"].tolist()
+    longer = training.replace(agent_steps=960)
+    learned = read_policy(train(longer, tmp_path / "longer")).tensors
+    assert learned["layers.0.weight"][:, n_read:].any()
+    card = policies.read_card(tmp_path / "on/small.safetensors")
+    assert card.training["start"] == {"name": str(start), "label": "small", "parameters": {}}
+
+
+def test_of_several_trainings_a_training_goes_on_from_that_of_its_number(small: Any) -> None:
+    network = small().network.replace(hidden=(128, 64))
+    seeds = [
+        small(network=network, start="ppo-robust@all", seed=seed).start_policy.card.seed
+        for seed in (0, 1, 7)
+    ]
+    assert seeds[0] == seeds[2] != seeds[1]

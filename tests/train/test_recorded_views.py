@@ -14,8 +14,8 @@ from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.train.privileged import PRIVILEGED
 from swarm_logistics_env.train.training_worlds import NetworkView
 from swarm_logistics_env.world.motion.frame import OUTPUTS
-from swarm_logistics_env.world.motion.network_inputs import INPUTS, ROLE_INPUTS
-from swarm_logistics_env.world.motion.voices import MESSAGES, VOICE_INPUTS
+from swarm_logistics_env.world.motion.network_inputs import input_names
+from swarm_logistics_env.world.motion.voices import MESSAGES
 from tests.conftest import Check
 
 TERMS = {
@@ -37,7 +37,11 @@ def trainings(small: Any) -> dict[str, Any]:
     talking = scenario.replace(message_size=2, drive="differential", n_requests=2)
     weights = {"S": 0.5, "R": 1.0, "FT": 0.3, "A": 0.2, "P": 0.1}
     return {
-        "plain": small(rewards=TERMS, scenario=scenario.replace(handling_time=0.2)),
+        "plain": small(
+            network=Network(hidden=(8,), sees_items=True),
+            rewards=TERMS,
+            scenario=scenario.replace(handling_time=0.2),
+        ),
         "with a teacher": small(
             network=TALKING,
             scenario=talking,
@@ -70,8 +74,7 @@ def test_views_are_as_recorded(small: Any, check_recorded: Check) -> None:
             rows, rewards, _, _ = view.step_wait()
             read.append(rows)
             paid.append(rewards)
-        names = [*INPUTS, *(ROLE_INPUTS if network.role else ())]
-        names += [*VOICE_INPUTS, *PRIVILEGED._fields] if network.talks else PRIVILEGED._fields
+        names = [*input_names(**network.reads), *PRIVILEGED._fields]
         names += [f"true {message}" for message in MESSAGES] if network.talks else []
         names += [f"label of {output}" for output in OUTPUTS] if training.teacher else []
         columns = np.stack(read).astype(float)

@@ -69,11 +69,12 @@ TALKING = CLASSES.replace(talks=True)
 def test_a_training_with_a_teacher_goes_on_to_the_same_bits_and_keeps_the_best_network(
     small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    teacher = {"policy": "homing", "decisions": 200, "warm_up": 1, "pull": 0.1, "pull_until": 0.6}
+    teacher = {"policy": "homing", "decisions": 200, "pull": 0.1, "pull_until": 0.6}
     rewards = {"delivery": 1.0, "held_inside": 0.3, "contact": -0.1}
     scenario = small().scenario.replace(message_size=N_MESSAGES)
+    ppo = small().ppo.replace(warm_up=1)
     training = small(
-        network=TALKING, scenario=scenario, teacher=teacher, rewards=rewards, keep="best"
+        network=TALKING, scenario=scenario, teacher=teacher, ppo=ppo, rewards=rewards, keep="best"
     )
 
     def interrupt(inside: dict[str, Any], _: object) -> bool:
@@ -95,9 +96,10 @@ def test_a_training_with_a_teacher_goes_on_to_the_same_bits_and_keeps_the_best_n
 def test_the_network_comes_to_say_what_the_teacher_says_and_the_critic_warms_up_alone(
     small: Any, tmp_path: Path, network: Network
 ) -> None:
-    teacher = {"policy": "homing", "decisions": 4000, "warm_up": 2, "rate": 0.03}
+    teacher = {"policy": "homing", "decisions": 4000, "rate": 0.03}
+    ppo = small().ppo.replace(warm_up=2)
     scenario = small().scenario.replace(message_size=N_MESSAGES if network.talks else 0)
-    training = small(network=network, scenario=scenario, teacher=teacher)
+    training = small(network=network, scenario=scenario, teacher=teacher, ppo=ppo)
     other = NetworkView(training)
     other.seed(1)
     columns = torch.from_numpy(other.reset())[:, : network.widths[0]]

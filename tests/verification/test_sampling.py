@@ -207,6 +207,27 @@ def test_shares_and_survivors_are_told(
     assert total in again
 
 
+def test_no_fault_is_made_where_a_golden_trajectory_fails_without_one(
+    tree: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trajectories = tree / "tests/verification/test_trajectories.py"
+    trajectories.parent.mkdir()
+    trajectories.write_text("")
+
+    def run_tests(copy: Path, tests: Iterable[str], **_: object) -> str:
+        assert list(tests) == ["tests/verification/test_trajectories.py"]
+        return "that of this name"
+
+    monkeypatch.setattr(sampling, "run_tests", run_tests)
+    borrowed = copies.Copies(1, tree, tree.parent / "copies")
+    record = sampling.Made(tree / "made.jsonl", "this tree")
+    package = sampling.Package(tree, ["sizes"])
+    assert sampling.measure_sample(9, 0, package, borrowed, 1, 60.0, record) == 2
+    assert capsys.readouterr().out == (
+        "that of this name fails without any fault, so it catches none\n"
+    )
+
+
 def test_faults_that_change_nothing_can_still_be_drawn() -> None:
     files = {mutant.file for mutant in read_equal()}
     trees = {file: ast.parse((ROOT / PACKAGE / file).read_text("utf-8")) for file in files}

@@ -26,7 +26,7 @@ from swarm_logistics_env.world.motion.steering import clear_the_way, steer
 from swarm_logistics_env.world.motion.voices import N_MESSAGES
 from swarm_logistics_env.world.scenario import Scenario
 
-from .network_inputs import COSINES, SINES, TURNS, n_inputs, read_observations
+from .network_inputs import COSINES, SINES, TURNS, input_names, read_observations
 
 OUTPUTS = ("along", "aside", "gripper")
 N_OUTPUTS = len(OUTPUTS)
@@ -40,8 +40,9 @@ class MotionView:
     Args:
         scenario: for its control period and for what robots know of their bodies.
         listens: whether the lowest timer heard is read; zeros if not, so that no liar leads.
-        has_role: whether `ROLE_INPUTS` stand behind the other inputs.
-        talks: whether rows have messages, `VOICE_INPUTS` stand behind the other inputs, and
+        sees_items: whether `SIGHT_INPUTS` stand behind `INPUTS`.
+        has_role: whether `ROLE_INPUTS` stand behind those.
+        talks: whether rows have messages, `VOICE_INPUTS` stand behind all other inputs, and
             `MESSAGES` behind the outputs.
 
     Attributes:
@@ -56,6 +57,8 @@ class MotionView:
         self,
         scenario: Scenario,
         listens: bool = True,
+        *,
+        sees_items: bool = False,
         has_role: bool = False,
         talks: bool = False,
     ) -> None:
@@ -63,7 +66,7 @@ class MotionView:
         self._bodies = bodies_of(scenario)
         self._listens = listens
         self._n_columns = row.MESSAGES + (row.N_NEIGHBOURS * N_MESSAGES if talks else 0)
-        self._n_inputs = n_inputs(has_role, talks)
+        self._n_inputs = len(input_names(sees_items, has_role, talks))
         self.begin(np.empty(0, np.uint64))
 
     def begin(self, keys: NDArray[np.uint64], bodies: NDArray[np.float64] | None = None) -> None:

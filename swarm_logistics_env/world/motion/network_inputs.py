@@ -24,7 +24,8 @@ from swarm_logistics_env.world.motion.memory import (
     remember_row,
     to_frame,
 )
-from swarm_logistics_env.world.motion.voices import N_VOICE_INPUTS, read_voices
+from swarm_logistics_env.world.motion.sight import N_SIGHT_INPUTS, SIGHT_INPUTS, read_sight
+from swarm_logistics_env.world.motion.voices import N_VOICE_INPUTS, VOICE_INPUTS, read_voices
 
 N_FAR = 8  # neighbours
 N_NEAR = 3  # near ones
@@ -64,16 +65,18 @@ INPUTS: tuple[str, ...] = (
 _Columns = namedtuple("_Columns", INPUTS)  # type: ignore[misc]  # by their names, as above
 INPUT: Any = _Columns(*range(len(INPUTS)))  # the column of each input
 LEAD = slice(INPUT.lead_present, INPUT.lead_timer + 1)
-# Of a network with a role, behind the others.
-ROLE_INPUTS = ("role", "role_edge")
-N_ROLE_INPUTS = len(ROLE_INPUTS)
 N_INPUTS = len(INPUTS)
-FEWEST_TALKING_INPUTS = N_INPUTS + N_VOICE_INPUTS
+ROLE_INPUTS = ("role", "role_edge")
 
 
-def n_inputs(has_role: bool, talks: bool) -> int:
-    """Return how many inputs a network reads: those of the role, then of voices, come last."""
-    return N_INPUTS + N_ROLE_INPUTS * has_role + N_VOICE_INPUTS * talks
+def input_names(
+    sees_items: bool = False, has_role: bool = False, talks: bool = False
+) -> tuple[str, ...]:
+    """Return the names of all that a network reads: `INPUTS`, then what is sensed besides."""
+    sight = SIGHT_INPUTS if sees_items else ()
+    role = ROLE_INPUTS if has_role else ()
+    voices = VOICE_INPUTS if talks else ()
+    return (*INPUTS, *sight, *role, *voices)
 
 
 @inlined_kernel
@@ -107,7 +110,7 @@ def read_observations(
     inputs: NDArray[np.float32],
     turned: NDArray[np.float64],
 ) -> None:
-    """Do as `turn_frames`, and fill inputs (N, `n_inputs`).
+    """Do as `turn_frames`, and fill inputs (N, k), as many as `input_names` has.
 
     Args:
         counts: the decisions of each row before this one (N,).
@@ -138,12 +141,16 @@ def read_observations(
         read[INPUT.whim_along], read[INPUT.whim_aside] = math.cos(angle), math.sin(angle)
         read_memory(memory, certainty, confidence, kept_home, frame, read)
         # How many there are says which: compiled code leaves out what a network does not read.
-        if inputs.shape[1] >= FEWEST_TALKING_INPUTS:
+        # Sight has more inputs than voices, and they have more than a role.
+        if inputs.shape[1] >= N_INPUTS + N_SIGHT_INPUTS:
+            read_sight(sensed, memory, kept_home[2], beams, frame, N_INPUTS, read)
+        if (inputs.shape[1] - N_INPUTS) % N_SIGHT_INPUTS >= N_VOICE_INPUTS:
             read_voices(sensed, frame, inputs.shape[1] - N_VOICE_INPUTS, read)
-        if inputs.shape[1] != N_INPUTS and inputs.shape[1] != FEWEST_TALKING_INPUTS:
+        if (inputs.shape[1] - N_INPUTS) % N_SIGHT_INPUTS % N_VOICE_INPUTS > 0:
             role = role_of(keys[robot], random_heading_number(counts[robot], period))
-            read[N_INPUTS] = 2.0 * role - 1.0
-            read[N_INPUTS + 1] = 1.0 if role < ROLE_EDGE else -1.0
+            first = inputs.shape[1] - (inputs.shape[1] - N_INPUTS) % N_SIGHT_INPUTS
+            read[first] = 2.0 * role - 1.0
+            read[first + 1] = 1.0 if role < ROLE_EDGE else -1.0
 
 
 @inlined_kernel

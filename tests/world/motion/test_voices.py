@@ -12,7 +12,7 @@ from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.frame import MotionView
 from swarm_logistics_env.world.motion.memory import MEMORY
-from swarm_logistics_env.world.motion.network_inputs import INPUTS, ROLE_INPUTS
+from swarm_logistics_env.world.motion.network_inputs import INPUTS, input_names
 from swarm_logistics_env.world.motion.voices import N_MESSAGES, N_VOICE_INPUTS, VOICE_INPUTS
 from swarm_logistics_env.world.scenario import Scenario
 
@@ -38,7 +38,7 @@ def inputs_of(rows: Rows, has_role: bool = False) -> dict[str, float]:
     frame.begin(row_keys(0, "test", len(rows)))
     # So that the frame of motion is that of the body.
     frame.memory[:, [MEMORY.heading_x, MEMORY.heading_y]] = 1.0, 0.0
-    names = (*INPUTS, *(ROLE_INPUTS if has_role else ()), *VOICE_INPUTS)
+    names = input_names(has_role=has_role, talks=True)
     return dict(zip(names, frame.read(rows)[0].tolist(), strict=True))
 
 
