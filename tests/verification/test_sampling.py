@@ -241,3 +241,13 @@ def test_faults_that_change_nothing_can_still_be_drawn() -> None:
     for mutant in read_equal():
         assert (mutant.file, mutant.where, mutant.node, mutant.becomes) in drawable, mutant.name
         assert mutant.survives, mutant.name
+
+
+def test_the_test_that_fails_is_named_whole_whatever_its_parameters_are(tmp_path: Path) -> None:
+    (tmp_path / "test_names.py").write_text(
+        "import pytest\n\n\n@pytest.mark.parametrize('name', ['a', 'day (1) - Copy.csv'])\n"
+        "def test_short(name):\n    assert len(name) < 9, 'too long - really'\n"
+    )
+    name = "test_names.py::test_short[day (1) - Copy.csv]"
+    assert copies.run_tests(tmp_path, ["test_names.py"], interpreted=False, limit=60.0) == name
+    assert copies.run_tests(tmp_path, [name], interpreted=False, limit=60.0) == name

@@ -1,6 +1,7 @@
 """Copies of the tree in which mutants are made, and the tests that run there."""
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -21,6 +22,8 @@ _LEFT_OUT_AT_TOP = shutil.ignore_patterns(
 )
 # Those that take the interpreter a minute or more; see KERNELS in the Makefile.
 SLOW = "not (fewer_items or diffuses or in_a_crowd or drop_rate or ctrl_c or in_a_run)"
+# The name of a test's parameters may hold what stands between the name and the error.
+_FAILED = re.compile(r"^(FAILED|ERROR) (?P<test>\S+?(\[.*?\])?)( - |$)", re.MULTILINE)
 NO_END = "no end"  # what is said of tests that were stopped, or whose process crashed
 NO_IMPORT = "pytest itself"  # what is said where pytest cannot start: a module is not imported
 
@@ -116,9 +119,9 @@ def run_tests(
         return ""
     if running.returncode < 0:
         return NO_END
-    failed = [line for line in output.splitlines() if line.startswith(("FAILED ", "ERROR "))]
+    failed = _FAILED.search(output)
     if failed:
-        return failed[0].partition(" ")[2].split(" - ")[0]
+        return failed["test"]
     # 2 and 3: a module could not be imported; pytest broke. The mutant did it, if it is one.
     if running.returncode in (2, 3) or "ImportError while loading conftest" in output:
         return NO_IMPORT
