@@ -110,7 +110,7 @@ class Network(_Part):
     @property
     def reads(self) -> dict[str, bool]:
         """What it reads besides `INPUTS`, by the arguments of `input_names` and `MotionView`."""
-        return {"sees_items": self.sees_items, "has_role": self.role, "talks": self.talks}
+        return {"has_role": self.role, "talks": self.talks, "sees_items": self.sees_items}
 
     @property
     def widths(self) -> list[int]:
@@ -152,7 +152,8 @@ class PolicyCard(_Part):
         network: the network that decides.
         command: the command line that trained it.
         versions: the versions of the packages that trained it; "simulation" is the digest of the
-            world's code (`study.tasks.warehouse_task.WAREHOUSE.code`) at that time.
+            world's code (`study.tasks.warehouse_task.WAREHOUSE.code`) at that time, "start" that of
+            the weights that the training began with, if they were not untrained.
         scored_with: the versions with which it was scored.
         scenario: what it was trained in, fields that differ from the defaults.
         training: the specification of the training.

@@ -60,6 +60,7 @@ class Operators:
         is_whole = left.kind is INT and right.kind is INT
         match symbol:
             case ast.Mod() if is_whole and None not in (left.constant, right.constant):
+                # So that what a network does not read is left out.
                 return constant(left.constant % right.constant)
             case ast.Mod():
                 name = "remainder_of" if is_whole else "modulo"

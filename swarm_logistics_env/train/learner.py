@@ -23,7 +23,7 @@ from swarm_logistics_env.train.actor_critic import ClassesPolicy, GaussianPolicy
 from swarm_logistics_env.train.settings import PPOSettings
 from swarm_logistics_env.train.training_worlds import NetworkView, check_finite
 from swarm_logistics_env.world.motion.classes import N_DIRECTIONS, classes_of
-from swarm_logistics_env.world.motion.network_inputs import input_names
+from swarm_logistics_env.world.motion.network_inputs import LEAD, input_names
 
 CHECKPOINT = "checkpoint.pt"
 STATE = ("num_timesteps", "_n_updates", "_last_obs", "_last_episode_starts")  # of the learner
@@ -124,13 +124,21 @@ def begin_from(start: LearnedPolicy, policy: Any, network: Network) -> None:
     Noise begins as the settings have it, and messages that it does not say as they are untrained.
 
     Args:
-        start: of which `network`, that of the policy, has the hidden layers and the head.
+        start: with the hidden layers and the head of `network`.
+        policy: of the learner.
+        network: that the policy trains.
     """
     inputs = input_names(**network.reads)
-    columns = [inputs.index(name) for name in input_names(**start.card.network.reads)]
+    of_start = input_names(**start.card.network.reads)
+    first_weight = start.tensors["layers.0.weight"].copy()
+    if not start.card.network.listens:
+        first_weight[:, LEAD] = 0.0  # it read zeros there, so that these are untrained
     for layer, parts in enumerate(_layers_of(policy)):
-        weight = torch.from_numpy(start.tensors[f"layers.{layer}.weight"])
-        bias = torch.from_numpy(start.tensors[f"layers.{layer}.bias"])
+        weight = start.tensors[f"layers.{layer}.weight"]
+        bias = start.tensors[f"layers.{layer}.bias"]
+        if layer == 0:
+            weight = np.zeros((len(bias), len(inputs)), np.float32)
+            weight[:, [inputs.index(name) for name in of_start]] = first_weight
         first = 0
         for part in parts:
             rows = slice(first, first + part.out_features)
@@ -138,9 +146,8 @@ def begin_from(start: LearnedPolicy, policy: Any, network: Network) -> None:
             if first > len(bias):  # messages, which the start does not say
                 continue
             with torch.no_grad():
-                part.weight.zero_()
-                part.weight[:, columns if layer == 0 else slice(None)] = weight[rows]
-                part.bias.copy_(bias[rows])
+                part.weight.copy_(torch.from_numpy(weight[rows]))
+                part.bias.copy_(torch.from_numpy(bias[rows]))
 
 
 def _layers_of(policy: Any) -> list[list[torch.nn.Linear]]:

@@ -156,9 +156,9 @@ class PPOSettings(Part):
         least_deviation: the lower limit of deviations at the start and at the end; it changes
             geometrically in between. Without it the noise vanishes long before the policy is good.
         least_until: the share of the training after which the limit stays at its end.
-        warm_up: the first updates in which the value network alone learns, where the actor can do
-            something already, of a teacher or from a start: one that learns from values of an
-            untrained value network forgets it.
+        warm_up: the first updates, in which the value network alone learns. An actor that begins
+            with a teacher or a start would forget what it can do if it learned from an untrained
+            value network.
         message_weight: the weight of the messages' squared error relative to the policy's loss,
             where a network talks: what it says is learned from what is so, known while it trains.
         value_hidden: widths of the value network, which is not shipped. It reads more than a robot

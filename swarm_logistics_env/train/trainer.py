@@ -141,6 +141,7 @@ def _train(
                 start = training.start_policy
                 if start is not None:
                     begin_from(start, learner.policy, training.network)
+                    log.start = start.parameters.weights
                 imitate(training, learner, log, generator(training.seed, "imitation"))
             log.versions = versions()
             total = training.agent_steps

@@ -7,7 +7,12 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model_validator
 
-from swarm_logistics_env.core.errors import SwarmLogisticsError, TrainingError, suggest
+from swarm_logistics_env.core.errors import (
+    PolicyError,
+    SwarmLogisticsError,
+    TrainingError,
+    suggest,
+)
 from swarm_logistics_env.core.records import FileName, each_of, one_of, read_table
 from swarm_logistics_env.environment.rewards import RewardTerms
 from swarm_logistics_env.policies.learned import LearnedPolicy, Network
@@ -38,7 +43,12 @@ def _scenario_of(fields: object) -> object:
 
 
 def _start_of(policy: object) -> object:
-    return None if policy is None else PolicySpec.of(policy)
+    if policy is None:
+        return None
+    start = PolicySpec.of(policy)
+    if start.made is not None:
+        raise ValueError(f"start = {start.name}: should be a policy's name or the path of its file")
+    return start
 
 
 class Training(Part):
@@ -64,8 +74,8 @@ class Training(Part):
         network: what the policy reads and commands.
         start: a policy that `train` wrote, by its name or its path, whose network it goes on from;
             what that does not read begins with weights of 0. Of "ppo-robust@all", which stands for
-            several trainings, that of number `seed` is taken, round and round.
-        teacher: a script that it imitates at first; with neither it learns from nothing.
+            n trainings, the one of number `seed` modulo n is taken, by the seeds on their cards.
+        teacher: a script that it imitates at first; without it and `start` it learns from nothing.
         ppo: settings of the learner.
         evaluation: what is measured during the training.
         scores: what is measured at its end.
@@ -148,18 +158,14 @@ class Training(Part):
         if policy is None:
             return
         of_start = policy.card.network
-        for name in ("hidden", "head"):
+        for name in ("hidden", "head", "listens", "sees_items", "role", "talks"):
             value = getattr(self.network, name)
-            if value != getattr(of_start, name):
+            value_of_start = getattr(of_start, name)
+            reads_more = value is True and value_of_start is False
+            if value != value_of_start and not reads_more:
                 raise ValueError(
-                    f"network.{name} = {value!r}: should be {getattr(of_start, name)!r}, as "
+                    f"network.{name} = {value!r}: should be {value_of_start!r}, as "
                     f"{policy.card.name} has, from which it goes on"
-                )
-        for name, is_read in of_start.reads.items():
-            if is_read and not self.network.reads[name]:
-                raise ValueError(
-                    f"start: should be a network without {name.removeprefix('has_')} = true, or "
-                    "the network should have that, too"
                 )
 
     def _check_ppo(self) -> None:
@@ -223,16 +229,21 @@ class Training(Part):
         """The policy that it goes on from; None: it begins with an untrained network.
 
         Raises:
-            ValueError, PolicyError: there is no such policy, or `train` did not write it.
+            ValueError: there is no such policy, or `train` did not write it.
         """
         if self.start is None:
             return None
-        trainings = self.start.trainings
-        start = trainings[self.seed % len(trainings)] if trainings else self.start
-        policy = None if start.runs_code else start.load()
-        if not isinstance(policy, LearnedPolicy):
-            raise ValueError(f"start = {start.title!r}: should be a policy that train wrote")
-        return policy
+        policies = []
+        for start in self.start.trainings or (self.start,):
+            try:
+                policy = None if start.runs_code else start.load()
+            except PolicyError as error:
+                raise ValueError(f"start = {start.name!r}: {error}") from error
+            if not isinstance(policy, LearnedPolicy):
+                raise ValueError(f"start = {start.name!r}: should be a policy that train wrote")
+            policies.append(policy)
+        policies.sort(key=lambda policy: policy.card.seed)
+        return policies[self.seed % len(policies)]
 
     @property
     def each_world(self) -> tuple[tuple[WorldKind, Scenario], ...]:

@@ -42,6 +42,7 @@ class TrainingLog:
         seconds: trained before this session (wall clock).
         cpu_seconds: processor time of collecting and updating so far [s].
         versions: that it learned with last.
+        start: the digest of the weights that it began with; empty: untrained ones.
     """
 
     curve: list[dict[str, float]] = field(default_factory=list)
@@ -49,6 +50,7 @@ class TrainingLog:
     seconds: float = 0.0
     cpu_seconds: float = 0.0
     versions: dict[str, str] = field(default_factory=dict)
+    start: str = ""
 
     @property
     def best(self) -> dict[str, float]:
@@ -209,7 +211,7 @@ def card_of(
         about=training.about,
         network=training.network,
         command=command,
-        versions=log.versions,
+        versions=log.versions | ({"start": log.start} if log.start else {}),
         scenario=training.evaluation_scenario.model_dump(mode="json", exclude_defaults=True),
         training=training.model_dump(mode="json", exclude_defaults=True),
         seed=training.seed,

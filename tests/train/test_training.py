@@ -68,7 +68,7 @@ def test_worlds_of_several_kinds_stand_side_by_side() -> None:
         ("ppo.message_weight = 0.5", "ppo.message_weight: should be left out, as network.talks"),
         ("ppo.warm_up = 5", "ppo.warm_up: should be left out, as it learns from nothing"),
         ("start = 'homing'", "start = 'homing': should be a policy that train wrote"),
-        ("start = 'ppo-robost'", "no policy 'ppo-robost' .* did you mean 'ppo-robust'"),
+        ("start = 'ppo-robost'", "start = 'ppo-robost': no policy .* did you mean 'ppo-robust'"),
         ("start = 'ppo-robust'", r"hidden = \(128, 128\): should be \(128, 64\), as ppo-robust"),
         (
             "start = 'ppo-robust'\nnetwork = { hidden = [128, 64], head = 'classes' }",

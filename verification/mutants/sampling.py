@@ -220,7 +220,7 @@ def measure_sample(
 
     `seconds`: of a core, after which no further test of a group begins; where kernels are compiled
     anew, later by `SECONDS_OF_COMPILING`. Returns 2 if a test that caught faults also fails without
-    one, which of the golden trajectories is seen before any fault is made; else 0.
+    one, else 0. Golden trajectories are checked before the first fault, other tests at the end.
     """
     start = time.monotonic()
     with copies.borrow() as copy:
@@ -262,8 +262,9 @@ def measure_sample(
     print(f"{(time.monotonic() - start) / 60:.0f} min")
     with copies.borrow() as copy:
         for mode in (False, True):
-            caught = {test for fault, test in results if fault.interpreted is mode}
-            if _print_guilty(copy, sorted(test for test in caught if "::" in test), mode):
+            of_mode = {test for fault, test in results if fault.interpreted is mode}
+            catching_tests = sorted(test for test in of_mode if "::" in test)
+            if _print_guilty(copy, catching_tests, mode):
                 return 2
     return 0
 

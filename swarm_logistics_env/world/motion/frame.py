@@ -40,10 +40,10 @@ class MotionView:
     Args:
         scenario: for its control period and for what robots know of their bodies.
         listens: whether the lowest timer heard is read; zeros if not, so that no liar leads.
-        sees_items: whether `SIGHT_INPUTS` stand behind `INPUTS`.
-        has_role: whether `ROLE_INPUTS` stand behind those.
+        has_role: whether `ROLE_INPUTS` stand behind `INPUTS`.
         talks: whether rows have messages, `VOICE_INPUTS` stand behind all other inputs, and
             `MESSAGES` behind the outputs.
+        sees_items: whether `SIGHT_INPUTS` stand right behind `INPUTS`.
 
     Attributes:
         keys: of each row's stream (N,).
@@ -57,16 +57,15 @@ class MotionView:
         self,
         scenario: Scenario,
         listens: bool = True,
-        *,
-        sees_items: bool = False,
         has_role: bool = False,
         talks: bool = False,
+        sees_items: bool = False,
     ) -> None:
         self.period = scenario.control_period
         self._bodies = bodies_of(scenario)
         self._listens = listens
         self._n_columns = row.MESSAGES + (row.N_NEIGHBOURS * N_MESSAGES if talks else 0)
-        self._n_inputs = len(input_names(sees_items, has_role, talks))
+        self._n_inputs = len(input_names(has_role, talks, sees_items))
         self.begin(np.empty(0, np.uint64))
 
     def begin(self, keys: NDArray[np.uint64], bodies: NDArray[np.float64] | None = None) -> None:

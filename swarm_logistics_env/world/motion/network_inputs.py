@@ -70,7 +70,7 @@ ROLE_INPUTS = ("role", "role_edge")
 
 
 def input_names(
-    sees_items: bool = False, has_role: bool = False, talks: bool = False
+    has_role: bool = False, talks: bool = False, sees_items: bool = False
 ) -> tuple[str, ...]:
     """Return the names of all that a network reads: `INPUTS`, then what is sensed besides."""
     sight = SIGHT_INPUTS if sees_items else ()
@@ -141,7 +141,8 @@ def read_observations(
         read[INPUT.whim_along], read[INPUT.whim_aside] = math.cos(angle), math.sin(angle)
         read_memory(memory, certainty, confidence, kept_home, frame, read)
         # How many there are says which: compiled code leaves out what a network does not read.
-        # Sight has more inputs than voices, and they have more than a role.
+        # Sight has more inputs than voices and a role together, and a role has fewer than voices,
+        # so the remainders tell which there are.
         if inputs.shape[1] >= N_INPUTS + N_SIGHT_INPUTS:
             read_sight(sensed, memory, kept_home[2], beams, frame, N_INPUTS, read)
         if (inputs.shape[1] - N_INPUTS) % N_SIGHT_INPUTS >= N_VOICE_INPUTS:

@@ -16,15 +16,15 @@ from swarm_logistics_env.world.motion.memory import MEMORY, length_of, to_frame
 
 N_SEEN = 6  # items
 BEAM_REACH = 1.0  # [m]: the nearness of what a beam meets ends there
-SEEN_REACH = 1.1  # [m]: that of an item in view
-HOME_REACH = 1.5  # [m] from the delivery area, on either side of its edge
+SEEN_REACH = 1.1  # [m]: the nearness of an item in view ends there
+HOME_REACH = 1.5  # [m] from the edge of the delivery area, on either side of it
 _PARTS = ("nearness", "along", "aside", "recently_held")
-# Beams as those of walls; of an item its nearness, the direction to it, as long as that is, and
-# whether the robot put it down itself; and the distance from the delivery area on a finer scale.
+# Beams as those of walls. Of each item its nearness; the direction to it, a vector as long as the
+# nearness; and whether the robot put it down lately. Then the distance from the delivery area.
 SIGHT_INPUTS: tuple[str, ...] = (
     *(f"item_beam_{beam}" for beam in range(row.N_BEAMS)),
     *(f"item_{n}_{part}" for n in range(N_SEEN) for part in _PARTS),
-    "kept_home_nearness",
+    "kept_home_fine_distance",
 )
 N_SIGHT_INPUTS = len(SIGHT_INPUTS)
 _N_OF_ITEM = len(_PARTS)
