@@ -162,8 +162,7 @@ class Expressions(Operators):
             raise NoCError(f"{owner.text}.{name}")
         part = getattr(owner.value, name)
         if owner.is_fixed and isinstance(part, bool | int | float):
-            kind = REAL if isinstance(part, float) else constant(part).kind
-            return Value(f"{self._parts.record(owner)}.{name}", kind)
+            return Value(f"{self._parts.record(owner)}.{name}", constant(part).kind)
         if owner.is_fixed:
             return Known(part, f"{owner.name}_{name}", is_fixed=True)
         if owner.value is math:

@@ -102,6 +102,13 @@ def test_of_very_many_parts_those_that_come_first_are_looked_at() -> None:
         assert torch_modules_of([*(object() for _ in range(n_others)), network]) == networks
 
 
+def test_a_network_that_a_class_shares_among_its_objects_is_seen_as_well() -> None:
+    class Sharing:
+        network = module()
+
+    assert torch_modules_of([Sharing()]) == [Sharing.network]
+
+
 def test_a_method_that_learns_and_is_called_train_is_not_called() -> None:
     class Learner(torch.nn.Module):  # type: ignore[misc, name-defined]  # torch is any module here
         def __init__(self) -> None:
@@ -233,6 +240,7 @@ def traced(network: Any) -> Any:
             "the outputs value, logits: should give one, or call one of them action",
         ),
         (lambda: Giving(lambda actions: None), "gave no array of numbers"),
+        (lambda: Giving(lambda actions: ()), r"shape \(0,\)"),
         (lambda: Giving(torch.rand_like), "draw no random numbers"),
     ],
 )

@@ -22,7 +22,10 @@ def read(tmp_path: Path, text: str, **columns: str) -> Trials:
         *((name, "2.5") for name in ("time [min]", "time (Min.)", "time_min", "time in minutes")),
         *((name, "2.5") for name in ("Dauer [min]", "minutes", "Zeit / min", "tiempo (minutos)")),
         *((name, "150000") for name in ("time (ms)", "time_ms", "t_ms", "T [MS]", "timeMs")),
-        *((name, "150") for name in ("time", "time [s]", "Zeit [Sek.]", "time (seconds)", "t [s]")),
+        *(
+            (name, "150")
+            for name in ("time", "time []", "time [s]", "Zeit [Sek.]", "time (seconds)")
+        ),
         *((name, "0.041666666666666666") for name in ("time [h]", "temps [heures]", "time_hrs")),
         *((name, "0.001736111111111111") for name in ("time [d]", "Zeit [Tage]", "days to clear")),
         *((name, "150000000") for name in ("time [µs]", "time [us]", "time_usec")),
