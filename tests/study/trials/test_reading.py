@@ -113,6 +113,7 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
         (HEAD + GOOD + '2,8,"none,,7\n3,8,"x",,1\n', "line 3: opens a quote that is not closed"),
         (HEAD + '1,8,none,,"7\n2,8,none,,8\n3,8,none,,"\n', "line 2: opens a quote that holds who"),
         # 1200 or 1.2?
+        ("robots;p\n4;50\n4;9.999\n4;1.200\n", "line 4, column 'p': '1.200': is 1200 or 1.2"),
         (
             "robots;p\n4;980\n4;1.200\n",
             "line 3, column 'p': '1.200': is 1200 or 1.2, beside 980 in",
