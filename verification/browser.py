@@ -76,8 +76,9 @@ class Browser:
         return json.loads(message)
 
     def open(self, address: str) -> None:
-        """Go to an address."""
+        """Go to an address, and wait until the page and its scripts are there."""
         self.call("Page.navigate", url=address)
+        self.wait_for("location.href !== 'about:blank' && document.readyState === 'complete'")
 
     def value(self, expression: str) -> Any:
         """Return what a JavaScript expression is on the page."""
