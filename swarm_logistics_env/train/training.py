@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model_validator
 
@@ -283,6 +283,9 @@ def preset_names() -> list[str]:
 def load_training(source: str, *, trust_code: bool = False, **fields: object) -> Training:
     """Return a preset by its name, or the training in a TOML file, with some fields changed.
 
+    A file with `preset = "robust"` has the fields of that preset, in tables as well, where it says
+    nothing else; name and about are its own. Lists, as those of worlds, are replaced whole.
+
     Args:
         trust_code: whether a file may name reward terms that are code, which runs it.
 
@@ -290,10 +293,8 @@ def load_training(source: str, *, trust_code: bool = False, **fields: object) ->
         TrainingError: there is none, it is not TOML, or a field of it is unknown or cannot be; or
             it names code that nobody trusts.
     """
-    path = Path(source) if source.endswith(".toml") else PRESETS_FOLDER / f"{source}.toml"
-    if path.parent == PRESETS_FOLDER and path.stem not in preset_names():
-        raise TrainingError(f"no training preset {source!r}{suggest(source, preset_names())}")
-    fields_of_file = read_table(path, "training", TrainingError)
+    path = Path(source) if source.endswith(".toml") else _preset_path(source)
+    fields_of_file = _read_fields(path)
     terms = fields_of_file.get("rewards", {})
     code = [str(term) for term in terms if ":" in str(term)] if isinstance(terms, dict) else []
     if code and not trust_code:
@@ -305,3 +306,28 @@ def load_training(source: str, *, trust_code: bool = False, **fields: object) ->
         return Training(**{"name": path.stem, **fields_of_file, **fields})
     except SwarmLogisticsError as error:  # whichever record of it refuses
         raise TrainingError(f"{path.name}: {error}") from error
+
+
+def _preset_path(name: str) -> Path:
+    if name not in preset_names():
+        raise TrainingError(f"no training preset {name!r}{suggest(name, preset_names())}")
+    return PRESETS_FOLDER / f"{name}.toml"
+
+
+def _read_fields(path: Path) -> dict[str, Any]:
+    """Return the fields of a training file, with those of the preset that it changes."""
+    fields = read_table(path, "training", TrainingError)
+    preset = fields.pop("preset", None)
+    if preset is None:
+        return fields
+    if not isinstance(preset, str):
+        raise TrainingError(f"{path.name}: preset = {preset!r}: should be a text, as 'robust'")
+    of_preset = _read_fields(_preset_path(preset))
+    merged = {**of_preset, "name": path.stem, "about": ""}
+    for name, value in fields.items():
+        table = merged.get(name)
+        if isinstance(value, dict) and isinstance(table, dict):
+            merged[name] = {**table, **value}
+        else:
+            merged[name] = value
+    return merged

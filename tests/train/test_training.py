@@ -107,7 +107,33 @@ def test_what_cannot_be_is_refused(tmp_path: Path, text: str, sentence: str) -> 
         load_training(str(path))
 
 
+def test_a_file_changes_fields_of_a_preset_one_by_one_and_has_its_own_name(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        "preset = 'robust'\nscenario.n_items = 30\nrewards.stocking = 0.2\nworlds = [{count = 2}]"
+    )
+    robust = load_training("robust")
+    mine = load_training(str(path), seed=3)
+    changes = {
+        "name": "mine",
+        "about": "",
+        "seed": 3,
+        "scenario": robust.scenario.replace(n_items=30),
+        "rewards": {**robust.rewards, "stocking": 0.2},
+        "worlds": Training(worlds=[{"count": 2}]).worlds,
+    }
+    assert dict(mine) == {**dict(robust), **changes}
+
+
 def test_unknown_presets_and_files_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    for preset, sentence in (
+        ("'robus'", "no training preset 'robus'; did you mean 'robust'"),
+        ("3", "mine.toml: preset = 3: should be a text, as 'robust'"),
+    ):
+        path.write_text(f"preset = {preset}")
+        with pytest.raises(TrainingError, match=sentence):
+            load_training(str(path))
     with pytest.raises(TrainingError, match="no training preset 'deliver'; did you mean 'delivery"):
         load_training("deliver")
     with pytest.raises(TrainingError, match="cannot read the training"):
