@@ -36,6 +36,13 @@ def test_a_recording_begins_anew_with_each_episode() -> None:
     assert (first["seed"], first["time"], later_frames) == (2, 0.0, [])
 
 
+def test_a_battery_that_wears_is_offered_where_robots_have_one() -> None:
+    for scenario, is_offered in ((SMALL, False), (SMALL.replace(battery=5_000.0), True)):
+        modes = [mode["name"] for mode in messages.fixed_data(Session(scenario))["modes"]]
+        assert ("cell_fades" in modes) is is_offered
+        assert "FM1" in modes
+
+
 def frames_of(recording: Recording) -> list[dict[str, Any]]:
     """Return the frames that a page makes of a recording."""
     frames: list[dict[str, Any]] = [{}]
