@@ -151,6 +151,8 @@ def test_tests_that_run_a_line_come_first_the_quickest_before_the_others(
     assert of_tree.of("old/sizes.py", [5], seconds=4.0) == in_order[:2]
     assert of_tree.of("old/sizes.py", [9], seconds=99.0) == []
     assert of_tree.files_of("old/sizes.py", [5, 6]) == {MIRROR}
+    quick, _, slow = in_order
+    assert of_tree.quickest_first([MIRROR, slow, quick]) == [quick, slow, MIRROR]
     monkeypatch.setattr(reached, "_record", None)  # it is made once for a tree
     package = sampling.Package(tree, ["sizes"], reached.Reached(tree, tmp_path, 1))
     faults = {fault.line: fault for fault in sampling.draw(package, 0)}

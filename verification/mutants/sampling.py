@@ -137,6 +137,8 @@ class Package:
         self._compiler = {file for file, tree in trees.items() if _imports_compiler(tree)}
         recorded = sorted((root / "tests").rglob(_RECORDED))
         self._recorded = [*(str(path.relative_to(root)) for path in recorded), _GENERATED]
+        if reached is not None:
+            self._recorded = reached.quickest_first(self._recorded)
         # File and number of each place in it.
         self.places = [
             (file, number)
@@ -262,11 +264,17 @@ def measure_sample(
     print(f"{(time.monotonic() - start) / 60:.0f} min")
     with copies.borrow() as copy:
         for mode in (False, True):
-            of_mode = {test for fault, test in results if fault.interpreted is mode}
+            of_mode = {test for fault, test in results if _is_interpreted(fault, test) is mode}
             catching_tests = sorted(test for test in of_mode if "::" in test)
             if _print_guilty(copy, catching_tests, mode):
                 return 2
     return 0
+
+
+def _is_interpreted(fault: Fault, test: str) -> bool:
+    """Return whether the interpreter ran the kernels in the test that caught a fault."""
+    wide = {name.partition("::")[0] for group in fault.wide for name in group}
+    return fault.interpreted and test.partition("::")[0] not in wide
 
 
 def print_shares(results: Sequence[tuple[Fault, str]]) -> None:
