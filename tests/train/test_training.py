@@ -8,7 +8,7 @@ import pytest
 from swarm_logistics_env.core.errors import TrainingError
 from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.train import Training, load_training, preset_names
-from swarm_logistics_env.train.settings import PPOSettings, Teaching
+from swarm_logistics_env.train.settings import PPOSettings, Teaching, WorldKind
 
 
 @pytest.mark.unmeasured
@@ -120,7 +120,7 @@ def test_a_file_changes_fields_of_a_preset_one_by_one_and_has_its_own_name(tmp_p
         "seed": 3,
         "scenario": robust.scenario.replace(n_items=30),
         "rewards": {**robust.rewards, "stocking": 0.2},
-        "worlds": Training(worlds=[{"count": 2}]).worlds,
+        "worlds": (WorldKind(count=2),),
     }
     assert dict(mine) == {**dict(robust), **changes}
 
